@@ -1,4 +1,5 @@
-//! What the feedback says of utility and feasibility: each label, preference, suggestion and tie as an observation.
+//! What the feedback says of utility and feasibility: each label, preference, answer of no difference and suggestion as an
+//! observation.
 
 use std::collections::HashSet;
 
@@ -28,9 +29,11 @@ pub(crate) fn observations(
             Feedback::Label { category, .. } => settings.label_interval(category),
             Feedback::Preference { .. } => above(settings.preference_noise),
             Feedback::Suggestion { .. } => above(settings.coactive_noise),
-            Feedback::Tie { .. } => {
-                Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise }
-            }
+            Feedback::NoDifference { .. } => Interval {
+                low: -settings.no_difference_width,
+                high: settings.no_difference_width,
+                noise: settings.no_difference_noise,
+            },
         };
         let decided = settings.labels == Labels::Separate
             && minus.is_some_and(|minus| infeasible.contains(&plus) != infeasible.contains(&minus));

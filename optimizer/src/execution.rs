@@ -30,7 +30,7 @@ mod terrain;
 #[allow(clippy::unwrap_used)]
 mod simulation_tests;
 
-pub use execution_report::{ExecutionReport, StridesOnYield, SurvivedPushes, WalksOnGround};
+pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYield, SurvivedPushes};
 
 use crate::cancel_token::CancelToken;
 use crate::certificate::CertifiedGait;
@@ -126,7 +126,7 @@ pub fn simulate(
         if cancel.is_cancelled() {
             return Ok(None);
         }
-        grounds.push(WalksOnGround::of(ground_m, &outcomes));
+        grounds.push(SimulatedWalksOnGround::of(ground_m, &outcomes));
     }
     let strides_by_yield = YIELD_LADDER_M
         .into_iter()

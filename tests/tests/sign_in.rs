@@ -63,9 +63,9 @@ async fn start_anew(database: &Path) -> Service {
     Service::start(database, Analytic::default(), 1).await
 }
 
-async fn trail(service: &Service, action: &str) -> Vec<AuditRow> {
+async fn trail(service: &Service, change: &str) -> Vec<AuditRow> {
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    rows.into_iter().filter(|row| row.action == action).collect()
+    rows.into_iter().filter(|row| row.change == change).collect()
 }
 
 /// Attempts that were started and never finished, as when the client disconnects.
@@ -133,7 +133,7 @@ async fn change_is_refused_if_rights_or_consent_end_before_its_body_is_complete(
     let (_folder, mut service) = service().await;
     service.access = Arc::new(AccessState::by_sign_in(3600.0));
     let root = signed_in(&service, Role::Administrator).await;
-    let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    let study = service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
     let (id, link) = user(&service, "Eve", Role::Administrator).await;
     let mut writer = service.store.write().await.unwrap();
     let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
@@ -644,7 +644,7 @@ async fn event_streams_end_when_their_authorization_ends() {
     service.access = access(LIMITS, &offset);
     let admin = with_password(&service, "Ada", Role::Administrator, RIGHT).await;
     let root = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
-    let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    let study = service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
     let path = format!("/api/v1/studies/{study}/events");
     let users = ["signed out", "ended", "disabled", "demoted", "idle"];
     let mut ids = Vec::new();

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 /// Simulated walks on one kind of ground.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct WalksOnGround {
+pub struct SimulatedWalksOnGround {
     /// Largest height of bumps and depth of dips in the ground, m.
     pub ground_height_m: f64,
     /// Number of simulated walks.
-    pub walks: u32,
+    pub simulated_walks: u32,
     /// Walks that completed all strides.
     pub completed: u32,
     /// Walks that ended with a fall.
@@ -76,7 +76,7 @@ pub struct ExecutionReport {
     /// Completed strides without any disturbance.
     pub undisturbed_strides: u32,
     /// Randomly disturbed walks, for each kind of ground.
-    pub grounds: Vec<WalksOnGround>,
+    pub grounds: Vec<SimulatedWalksOnGround>,
     /// Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
     /// 0.01 m under body weight.
     pub strides_by_yield: Vec<StridesOnYield>,
@@ -84,24 +84,25 @@ pub struct ExecutionReport {
     pub pushes: Option<SurvivedPushes>,
 }
 
-impl WalksOnGround {
+impl SimulatedWalksOnGround {
     pub(super) fn of(ground_height_m: f64, outcomes: &[WalkOutcome]) -> Self {
         let ended = |end: WalkEnd| u32::try_from(outcomes.iter().filter(|o| o.end == end).count()).unwrap_or(u32::MAX);
-        let walks = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
+        let simulated_walks = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
         let periods = outcomes.iter().map(|o| o.periods).sum::<u64>().max(1);
         let share =
             |count: &dyn Fn(&WalkOutcome) -> u64| outcomes.iter().map(count).sum::<u64>() as f64 / periods as f64;
         let completed = ended(WalkEnd::Completed);
-        let (low, high) = wilson_interval(completed, walks);
+        let (low, high) = wilson_interval(completed, simulated_walks);
         Self {
             ground_height_m,
-            walks,
+            simulated_walks,
             completed,
             fell: ended(WalkEnd::Fell),
             halted: ended(WalkEnd::Halted),
-            completed_share: f64::from(completed) / f64::from(walks.max(1)),
+            completed_share: f64::from(completed) / f64::from(simulated_walks.max(1)),
             completed_share_interval: [low, high],
-            mean_strides: outcomes.iter().map(|o| f64::from(o.strides)).sum::<f64>() / f64::from(walks.max(1)),
+            mean_strides: outcomes.iter().map(|o| f64::from(o.strides)).sum::<f64>()
+                / f64::from(simulated_walks.max(1)),
             knee_saturated_share: share(&|o| o.saturated[0]),
             ankle_saturated_share: share(&|o| o.saturated[1]),
             knee_rate_limited_share: share(&|o| o.rate_limited[0]),

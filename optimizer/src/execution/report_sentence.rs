@@ -1,8 +1,8 @@
 //! An execution report as a sentence.
 
-use super::execution_report::{ExecutionReport, WalksOnGround};
+use super::execution_report::{ExecutionReport, SimulatedWalksOnGround};
 
-impl WalksOnGround {
+impl SimulatedWalksOnGround {
     /// The ground, as in "ground uneven by ±5 mm".
     pub fn ground_in_words(&self) -> String {
         match 1000.0 * self.ground_height_m {
@@ -18,7 +18,7 @@ impl ExecutionReport {
         let mut grounds: Vec<String> = self
             .grounds
             .iter()
-            .map(|on| format!("{} of {} simulated walks on {}", on.completed, on.walks, on.ground_in_words()))
+            .map(|on| format!("{} of {} simulated walks on {}", on.completed, on.simulated_walks, on.ground_in_words()))
             .collect();
         let strides = if self.strides == 1 { "1 stride".to_owned() } else { format!("{} strides", self.strides) };
         match (grounds.pop(), grounds.is_empty()) {

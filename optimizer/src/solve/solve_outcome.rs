@@ -35,7 +35,7 @@ pub(super) fn outcome(
     let (problem, program) = (context.problem, context.program);
     let Candidate { result, gait, status, .. } = candidate;
     let x = &result.x;
-    let figures = GaitResults::of_well_formed(&gait, &program.model, &problem.reference);
+    let results = GaitResults::of_well_formed(&gait, &program.model, &problem.reference);
     let margins = margins.relevant_at(program, x);
     let violations = program.violations(x);
     let warm_start = warm_start(context, &result, margins);
@@ -55,9 +55,9 @@ pub(super) fn outcome(
         started_from,
         iterations: tally.iterations,
         objective: program.objective(x),
-        cost_of_transport: figures.cost_of_transport,
-        gait_rmse_rad: figures.gait_rmse_rad,
-        gait_rmse_parts_rad: figures.gait_rmse_parts_rad,
+        cost_of_transport: results.cost_of_transport,
+        gait_rmse_rad: results.gait_rmse_rad,
+        gait_rmse_parts_rad: results.gait_rmse_parts_rad,
         max_violation: violations.first().map_or(0.0, |v| v.amount),
         optimality: Some(Optimality {
             dual_infeasibility: result.scaled_residuals.dual_infeasibility,
@@ -74,10 +74,10 @@ pub(super) fn outcome(
         variables: program.variables(),
         equalities,
         inequalities: program.rows() - equalities,
-        speed_m_s: figures.speed_m_s,
-        stride_length_m: figures.stride_length_m,
-        durations_s: figures.durations_s,
-        vhip_m_s: figures.vhip_m_s,
+        speed_m_s: results.speed_m_s,
+        stride_length_m: results.stride_length_m,
+        durations_s: results.durations_s,
+        vhip_m_s: results.vhip_m_s,
         attempts: tally.attempts,
     };
     // NaN is a violation.

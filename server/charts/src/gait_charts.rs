@@ -8,7 +8,7 @@ mod solve_charts;
 pub use group::Group;
 pub use solve_charts::solve;
 
-use crate::{Animation, Chart, Figure, LegCycle, Stroke, WalkerFigure, over_reference};
+use crate::{Animation, Chart, Figure, GaitWalker, LegCycle, Stroke, over_reference};
 use gait_optimizer::gait::stick_figure::StickFigure;
 use gait_optimizer::gait::{PhaseProgress, progress};
 use gait_optimizer::{Gait, ModelError, ReferenceGait};
@@ -39,7 +39,7 @@ fn drawn(gait: &Gait) -> Gait {
 }
 
 /// The gait as a picture that moves, for download.
-pub fn animation(walker: WalkerFigure) -> Figure {
+pub fn animation(walker: GaitWalker) -> Figure {
     Figure::animation("Walking", Animation::new(walker))
 }
 

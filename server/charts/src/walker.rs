@@ -5,11 +5,11 @@
 
 mod animation;
 mod body_outline;
-mod figure;
+mod gait_walker;
 mod muscle_paths;
 mod segment;
 
 pub use animation::Animation;
 pub(crate) use body_outline::parts;
-pub use figure::{Ghost, WalkerFigure};
+pub use gait_walker::{GaitWalker, Ghost};
 pub(crate) use segment::UNITS_PER_M;

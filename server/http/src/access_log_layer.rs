@@ -65,7 +65,7 @@ pub const NO_SUBJECT_DATA: [&str; 36] = [
 const EXPORTS_BY_POST: [&str; 2] = ["/system/backup", "/api/v1/backups"];
 
 /// Path parameters that are secrets.
-const SECRETS: [&str; 2] = ["{token}", "{link}"];
+const SECRETS: [&str; 2] = ["{code}", "{link}"];
 
 /// Longest time until a row is written.
 const WITHIN: Duration = Duration::from_secs(1);

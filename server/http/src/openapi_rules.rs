@@ -42,7 +42,7 @@ const NAMES: [(&str, &str, u32); 12] = [
 ];
 
 /// Parameters with rules.
-const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "token", "ids", "x", "y"];
+const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "x", "y"];
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
@@ -127,12 +127,12 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             tell.insert("else".to_owned(), reason);
         }
         schemas.add("NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
-        for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
+        for component in ["NewReferenceGait", "NewEmg", "NewJointAngles"] {
             schemas.add(component, "recording", &json!({ "minLength": 1 }));
         }
         schemas.add("NewReferenceGait", "format", &json!({ "default": "opensim" }));
         schemas.add("EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
-        schemas.add("MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
+        schemas.add("JointAngleReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
         schemas.add("Suggestion", "bounds", &bounds);
@@ -143,7 +143,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         }
         for component in ["NewStudy", "StudyClone"] {
             schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
-            schemas.add(component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
+            schemas.add(component, "number_of_trials", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
         schemas.add("NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
         schemas.add("NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
@@ -290,8 +290,8 @@ fn learner(missed: &mut Vec<String>) -> Value {
             preference_noise: usual.preference_noise * deviation,
             ordinal_noise: usual.ordinal_noise * deviation,
             coactive_noise: usual.coactive_noise * deviation,
-            tie_noise: usual.tie_noise * deviation,
-            tie_width: usual.tie_width * deviation,
+            no_difference_noise: usual.no_difference_noise * deviation,
+            no_difference_width: usual.no_difference_width * deviation,
             ordinal_thresholds: usual.ordinal_thresholds.iter().map(|threshold| threshold * deviation).collect(),
             ..usual.clone()
         };
@@ -351,7 +351,7 @@ fn state_parameter(parameter: &mut Value) {
             let names: Vec<String> = SORTS.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
             json!({ "enum": names })
         }
-        "token" => json!({ "pattern": "^[0-9a-f]{64}$" }),
+        "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => {
             let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
             json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })

@@ -30,7 +30,7 @@ impl CertifyCommand {
         let GaitFile { gait, report } = read_gait_file(&self.gait)?;
         let reference = reference_of(self.reference.as_deref())?;
         if let Some(report) = report {
-            check_figures(&gait, &report, &reference)
+            check_values(&gait, &report, &reference)
                 .map_err(|reason| Error::Malformed(format!("Cannot certify {}: {reason}", self.gait.display())))?;
         }
         let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
@@ -43,10 +43,10 @@ impl CertifyCommand {
     }
 }
 
-/// Checks the figures that a file states against those of its gait. The error is the reason.
-fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
-    let figures = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
-    match figures.difference(&GaitResults::of_report(report)) {
+/// Checks the results that a file states against those of its gait. The error is the reason.
+fn check_values(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
+    let results = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
+    match results.difference(&GaitResults::of_report(report)) {
         None => Ok(()),
         Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
             "the file says that {name} is {stated}; with the reference gait {:?} it is {computed}. If the solve \

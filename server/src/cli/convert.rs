@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use gait_optimizer::export::motion_file;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gaitwright_charts::gait_table::gait_csv;
-use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
+use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ impl ConvertCommand {
                 motion_file(&gait, self.rate_hz).map_err(|error| of_flags(error, &[("rate_hz", "--rate-hz")]))?
             }
             TargetFormat::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
-            TargetFormat::Animation => gait_charts::animation(WalkerFigure::new(&gait)?).svg(),
+            TargetFormat::Animation => gait_charts::animation(GaitWalker::new(&gait)?).svg(),
         };
         match out {
             Some(out) => out.write(&text),

@@ -22,12 +22,12 @@ const TABLES: [(&str, &str); 31] = [
     ("jobs", "trial_id in (select id from trials where study_id = ?)"),
     ("attempts", "trial_id in (select id from trials where study_id = ?)"),
     ("feedback", "study_id = ? order by seq"),
-    ("retractions", "feedback_seq in (select seq from feedback where study_id = ?)"),
+    ("feedback_retractions", "feedback_seq in (select seq from feedback where study_id = ?)"),
     ("blind_pairs", "study_id = ? order by id"),
     ("blind_pair_answers", "pair_id in (select id from blind_pairs where study_id = ?)"),
     ("blind_pair_retractions", "pair_id in (select id from blind_pairs where study_id = ?)"),
     ("blind_pair_allocations", archived_allocations::PAIRS),
-    ("unblindings", "study_id = ? order by seq"),
+    ("rater_unblindings", "study_id = ? order by seq"),
     ("assessments", "study_id = ? order by id"),
     ("assessment_retractions", "assessment_id in (select id from assessments where study_id = ?)"),
     ("safety_reports", "trial_id in (select id from trials where study_id = ?) order by rowid"),
@@ -43,12 +43,12 @@ const TABLES: [(&str, &str); 31] = [
     ),
     ("lab_sessions", "study_id = ? order by number"),
     ("lab_allocations", archived_allocations::LAB),
-    ("controller_file_downloads", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
-    ("lab_session_steps", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("lab_answers", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("lab_answer_retractions", "session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
-    ("measurement_files", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
-    ("emg_results", "session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("controller_file_downloads", "lab_session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("lab_session_steps", "lab_session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_answers", "lab_session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("lab_answer_retractions", "lab_session_id in (select id from lab_sessions where study_id = ?) order by rowid"),
+    ("measurement_files", "lab_session_id in (select id from lab_sessions where study_id = ?) order by id"),
+    ("emg_results", "lab_session_id in (select id from lab_sessions where study_id = ?) order by id"),
     ("imports", "study_id = ? order by seq"),
 ];
 
@@ -211,12 +211,12 @@ impl Unpacking {
                 before = row.integer("seq");
                 row.remove("seq");
             }
-            "retractions" => {
+            "feedback_retractions" => {
                 if let Some(seq) = row.integer("feedback_seq").and_then(|seq| self.sequence.get(&seq)) {
                     row.set("feedback_seq", Cell::Integer(*seq));
                 }
             }
-            "unblindings" | "imports" | "study_restrictions" => {
+            "rater_unblindings" | "imports" | "study_restrictions" => {
                 row.remove("seq");
             }
             _ => {}

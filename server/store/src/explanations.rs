@@ -8,7 +8,7 @@ use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
 use std::collections::BTreeSet;
 
-/// The action in the audit trail that requests an explanation.
+/// The change in the audit trail that requests an explanation.
 pub const REQUESTED: &str = "trial.ask_explanation";
 
 /// A stored explanation.

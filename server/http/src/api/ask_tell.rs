@@ -35,8 +35,8 @@ pub(super) async fn ask(
 ) -> Result<Response, Refusal> {
     let script = ask.script.as_deref().unwrap_or(&request.caller.name).trim();
     for _ in 0..MOST_TRIES {
-        let beliefs = Arc::clone(&app.beliefs);
-        let suggestion = lab_script::suggest(app.store_mut(), id, script, &beliefs).await;
+        let analyses = Arc::clone(&app.analyses);
+        let suggestion = lab_script::suggest(app.store_mut(), id, script, &analyses).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return repeat_ask(&app, before).await,

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::blind_motion::{BlindFigure, blind_motion, phase};
+use crate::blind_motion::{BlindStickFigure, blind_motion, phase};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
@@ -21,8 +21,8 @@ use utoipa::ToSchema;
 /// Pair to compare, as shown to a rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct BlindPair {
-    /// Token of the pair.
-    token: String,
+    /// Code of the pair.
+    code: String,
     /// Number of the pair for this rater.
     number: u32,
     /// URL of the motion that is shown first.
@@ -61,9 +61,9 @@ pub(super) async fn next(
     let answering = app.clone();
     let (writer, shown) = blind::next(app.store_mut(), &request.caller, id).await?;
     let pair = shown.map(|shown| BlindPair {
-        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.pair.token),
-        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.pair.token),
-        token: shown.pair.token,
+        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.pair.code),
+        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.pair.code),
+        code: shown.pair.code,
         number: shown.pair.number,
     });
     request.done(&answering, writer, &NextBlindPair { pair }).await
@@ -75,7 +75,7 @@ pub(super) struct BlindMotion {
     /// 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
     /// and of the right leg) as forward and upward coordinates, m.
     #[schema(value_type = Vec<Vec<Vec<f64>>>)]
-    figures: Vec<BlindFigure>,
+    stick_figures: Vec<BlindStickFigure>,
 }
 
 /// Motion of a pair.
@@ -91,11 +91,11 @@ pub(super) enum PairSide {
 /// The phase at which motions start differs between pairs, and is the same for both motions of a pair.
 #[utoipa::path(
     get,
-    path = "/blind-pairs/{token}/motions/{side}",
+    path = "/blind-pairs/{code}/motions/{side}",
     operation_id = "get_blind_motion",
     tag = "blind",
     params(
-        ("token" = String, Path, description = "Token of the pair"),
+        ("code" = String, Path, description = "Code of the pair"),
         ("side" = inline(PairSide), Path, description = "Which motion of the pair")
     ),
     responses((status = 200, description = "Motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
@@ -104,10 +104,10 @@ pub(super) enum PairSide {
 pub(super) async fn motion(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path((token, side)): Path<(String, PairSide)>,
+    Path((code, side)): Path<(String, PairSide)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
-    let shown = blind::own_showable_pair(&mut reader, &authorized.caller, &token).await?;
+    let shown = blind::own_showable_pair(&mut reader, &authorized.caller, &code).await?;
     let (first, second) = shown.shown();
     let trial = match side {
         PairSide::First => first,
@@ -115,16 +115,16 @@ pub(super) async fn motion(
     };
     let gait = gaits::get(&mut reader, trial).await;
     drop(reader);
-    let phase = phase(&token);
+    let phase = phase(&code);
     let motion = match gait {
         Ok(gait) => app.compute(move |pool| blind_motion(&gait.unpack(pool)?, phase)).await.map_err(Error::from),
         Err(error) => Err(error.into()),
     };
     let motion = motion.flatten();
     // The error must not reveal the trial, the subject or the device.
-    motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
+    motion.map(|stick_figures| Json(BlindMotion { stick_figures })).map_err(|error| {
         tracing::error!(%error, "cannot show a gait to a rater");
-        Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this token".to_owned() })
+        Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this code".to_owned() })
     })
 }
 
@@ -133,24 +133,24 @@ pub(super) async fn motion(
 /// The first answer to a pair counts. A safety report takes effect at once.
 #[utoipa::path(
     post,
-    path = "/blind-pairs/{token}/answer",
+    path = "/blind-pairs/{code}/answer",
     operation_id = "answer_blind_pair",
     tag = "blind",
-    params(("token" = String, Path, description = "Token of the pair")),
+    params(("code" = String, Path, description = "Code of the pair")),
     request_body = RaterAnswer,
     responses((status = 200, description = "Confirmation", body = AnswerReceipt)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
     State(app): State<AppState>,
-    Path(token): Path<String>,
+    Path(code): Path<String>,
     IdempotentWith(request, given): IdempotentWith<Rate, RaterAnswer>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let (_, answered) = blind::answer(&mut writer, &request.caller, &token, &given).await?;
+    let (_, answered) = blind::answer(&mut writer, &request.caller, &code, &given).await?;
     request.done(&app, writer, &answered).await
 }
 

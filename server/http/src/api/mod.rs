@@ -103,7 +103,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_study))
         .routes(routes!(figures::of_trial))
         .routes(routes!(figures::of_session))
-        .routes(routes!(figures::of_belief))
+        .routes(routes!(figures::of_analysis))
         .routes(routes!(figures::of_reference))
         // scripts of the lab
         .routes(routes!(ask_tell::ask))
@@ -124,7 +124,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(measurement_files::get))
         .routes(routes!(measurement_files::content))
         .routes(routes!(measurement_files::emg))
-        .routes(routes!(measurement_files::motion))
+        .routes(routes!(measurement_files::joint_angles))
         .routes(routes!(measurement_files::result, measurement_files::process))
         .routes(routes!(measurement_files::limit_cycles))
         .routes(routes!(lab_sessions::session_progress))

@@ -85,7 +85,7 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
     for row in rows {
         let (kind, a, b) = match row.content {
             FeedbackContent::Preference { winner, loser } => ("preference", winner, loser),
-            FeedbackContent::Tie { a, b } => ("tie", a, b),
+            FeedbackContent::NoDifference { a, b } => ("no_difference", a, b),
             FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => continue,
         };
         let retraction = row.retraction.as_ref();

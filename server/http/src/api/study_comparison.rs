@@ -112,9 +112,9 @@ async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal
     let counts = trials::counts(&mut reader, id).await?;
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
+    let analyses = Arc::clone(&app.analyses);
     let rank = move |pool: &OnPool| {
-        let best = ranking_to_show(pool, &snapshot, &beliefs);
+        let best = ranking_to_show(pool, &snapshot, &analyses);
         (snapshot, best)
     };
     let (snapshot, best) = app.compute(rank).await?;

@@ -1,6 +1,6 @@
-//! Figures of studies, trials, lab sessions, beliefs and reference gaits, for pages and for downloads.
+//! Figures of studies, trials, lab sessions, analyses and reference gaits, for pages and for downloads.
 
-pub(crate) mod belief;
+pub(crate) mod analysis;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 mod outcome;

@@ -3,7 +3,7 @@
 use crate::shared_state::AppState;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
-use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
+use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::pair_answer;
@@ -27,7 +27,7 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
     let draw = move |pool: &OnPool| {
         let (gait, iterations) = (gait.unpack(pool)?, iterations.unpack(pool)?);
         let mut figures =
-            vec![gait_charts::tiles(stick_figures(&gait)?), gait_charts::animation(WalkerFigure::new(&gait)?)];
+            vec![gait_charts::tiles(stick_figures(&gait)?), gait_charts::animation(GaitWalker::new(&gait)?)];
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
         }

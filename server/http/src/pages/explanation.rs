@@ -149,8 +149,8 @@ pub(super) async fn try_relaxed(
     Form(form): Form<ChosenRelaxation>,
 ) -> Result<Redirect, PageError> {
     for _ in 0..MOST_TRIES {
-        let beliefs = Arc::clone(&app.beliefs);
-        let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &beliefs).await?;
+        let analyses = Arc::clone(&app.analyses);
+        let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &analyses).await?;
         let mut writer = app.write().await?;
         if let Some(trial) = relaxed_trial::queue(&mut writer, &authorized.caller.actor, &chosen).await? {
             commit(writer).await?;

@@ -16,7 +16,7 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::reference::RecordedStride;
 use gaitwright_charts::gait_charts;
-use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};

@@ -12,7 +12,7 @@ use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Caller, Permission, Read, Run};
+use gaitwright_service::access::{Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_change::{self, StudyChange};
 use gaitwright_service::studies::study_plan;

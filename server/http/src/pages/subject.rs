@@ -13,7 +13,7 @@ use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Administer, Caller, Permission, Reach, Read, Run};
+use gaitwright_service::access::{Administer, Caller, Reach, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::consent::{self, ConsentWithdrawal, NewConsent};
 use gaitwright_service::studies::lab::LabSessionView;

@@ -3,7 +3,7 @@
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use gaitwright_service::studies::study_plan_schemas;
-use gaitwright_store::studies::{self, Evaluation, FeedbackMode, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{self, AnswerSource, Evaluation, StudyState, WarmStartFrom};
 use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -100,11 +100,11 @@ pub(crate) struct StudyPlan {
     #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     learner: LearnerSettings,
     /// Who answers comparisons.
-    feedback_mode: FeedbackMode,
+    answer_source: AnswerSource,
     /// What evaluates trials.
     evaluation: Evaluation,
     /// Number of trials.
-    trial_budget: u32,
+    number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.
@@ -135,9 +135,9 @@ impl From<studies::StudyPlan> for StudyPlan {
             base_bounds,
             search_space,
             learner,
-            feedback_mode,
+            answer_source,
             evaluation,
-            trial_budget,
+            number_of_trials,
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,
@@ -158,9 +158,9 @@ impl From<studies::StudyPlan> for StudyPlan {
             base_bounds,
             search_space,
             learner,
-            feedback_mode,
+            answer_source,
             evaluation,
-            trial_budget,
+            number_of_trials,
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,

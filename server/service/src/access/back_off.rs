@@ -171,12 +171,12 @@ fn normal(name: &str) -> String {
 
 /// Writes a row of the audit trail for the first attempts of a network, then for the 10th, 20th, 50th, 100th and so on,
 /// so that thousands of attempts do not fill the trail.
-async fn note(writer: &mut Writer, action: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
+async fn note(writer: &mut Writer, change: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
     if !is_recorded(attempts) {
         return Ok(());
     }
     let detail = json!({ "name": name, "network": origin.network, "failed_attempts_of_network": attempts });
-    Ok(audit::append(writer, &Actor::anonymous(), action, "session", &detail).await?)
+    Ok(audit::append(writer, &Actor::anonymous(), change, "session", &detail).await?)
 }
 
 /// Deletes counts that are a day old. The audit trail keeps the number of attempts.

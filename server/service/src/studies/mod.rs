@@ -4,10 +4,10 @@
 //! [`Scheduler`](scheduler::Scheduler) applies them: it proposes trials, dispatches solves and records results. All its
 //! state is in the record, so a new process continues where a killed one stopped.
 
+pub mod analysis;
 pub mod archive;
 pub mod assessment;
 pub mod atlas;
-pub mod belief;
 pub mod blind;
 pub mod bound_grid;
 pub mod built_in_entries;
@@ -22,7 +22,7 @@ pub mod execution;
 pub mod execution_request;
 mod explainer;
 pub mod explanation;
-pub mod gait_beliefs;
+pub mod gait_utilities;
 pub mod history;
 pub mod job_status;
 mod jobs_after_solves;

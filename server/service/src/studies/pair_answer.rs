@@ -126,7 +126,8 @@ const BESIDE: u32 = 20;
 /// # Errors
 /// Errors of the database.
 pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec<FeedbackRow>, Error> {
-    let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b }) = row.content else {
+    let (FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::NoDifference { a, b }) = row.content
+    else {
         return Ok(Vec::new());
     };
     Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)

@@ -103,7 +103,7 @@ async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId
 /// An answer of a person to a comparison that was not retracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurrentAnswer {
-    /// A preference or a tie.
+    /// A preference, which may be no difference.
     Preference(FeedbackId),
     /// An assessment: the person cannot tell, or reported a gait as unsafe.
     Assessment(gaitwright_store::AssessmentId),

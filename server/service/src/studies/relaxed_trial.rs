@@ -3,7 +3,7 @@
 //! The action is the nearest one of the search space whose relaxed bounds are at least as loose as the explanation needs, so
 //! the gait that the explanation found is a solution of it.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::bound_grid;
 use super::lifecycle::{self, StudyTransition};
 use super::snapshot::StudySnapshot;
@@ -103,7 +103,7 @@ pub async fn of(
     if let Some(known) = trials::of_action(db, study.id, action).await?.first() {
         return Ok(Err(NoRelaxedTrial::Tried { trial: known.id, number: known.number }));
     }
-    let extends = trials::counts(db, study.id).await?.total >= study.plan.trial_budget;
+    let extends = trials::counts(db, study.id).await?.total >= study.plan.number_of_trials;
     Ok(Ok(RelaxedTrial { bounds, extends, action }))
 }
 
@@ -169,7 +169,7 @@ pub async fn choose(
     store: &mut Store,
     id: TrialId,
     place: usize,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<ChosenTrial, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
@@ -182,11 +182,11 @@ pub async fn choose(
     let RelaxedTrial { bounds, action, .. } = of(&mut db, &study, &trial, relaxation).await??;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let rank = move |pool: &OnPool| {
-        let belief = beliefs.posterior(pool, &snapshot);
-        let ranked = belief.and_then(|belief| {
-            Ok::<_, LearnerError>((best_trial(&snapshot, &belief)?, warm_start_of_next(&snapshot, &belief)?))
+        let posterior = analyses.posterior(pool, &snapshot);
+        let ranked = posterior.and_then(|posterior| {
+            Ok::<_, LearnerError>((best_trial(&snapshot, &posterior)?, warm_start_of_next(&snapshot, &posterior)?))
         });
         (snapshot, ranked)
     };
@@ -220,11 +220,11 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
         return Ok(None);
     }
     let study = &snapshot.study;
-    let trial_budget = study.plan.trial_budget.max(new.number);
+    let number_of_trials = study.plan.number_of_trials.max(new.number);
     let state =
         if study.state.has_ended() { lifecycle::after(study.state, StudyTransition::Extend)? } else { study.state };
-    if (state, trial_budget) != (study.state, study.plan.trial_budget) {
-        study_change::raise_budget(writer, study, trial_budget, state).await?;
+    if (state, number_of_trials) != (study.state, study.plan.number_of_trials) {
+        study_change::raise_number_of_trials(writer, study, number_of_trials, state).await?;
         events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": "trial.relax" })).await?;
     }
     let Some(trial) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
@@ -234,7 +234,7 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
     let detail = json!({
         "study": study.id, "number": new.number, "without_gait": from,
         "bounds": bounds.iter().cloned().collect::<BTreeMap<_, _>>(),
-        "trial_budget": trial_budget,
+        "number_of_trials": number_of_trials,
     });
     audit::append(writer, actor, "trial.relax", &format!("trial {trial}"), &detail).await?;
     Ok(Some(trial))

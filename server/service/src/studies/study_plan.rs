@@ -9,7 +9,7 @@ use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -58,15 +58,15 @@ pub struct NewStudy {
     #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
-    #[serde(default = "automatic")]
-    pub feedback_mode: FeedbackMode,
+    #[serde(default = "gait_rmse")]
+    pub answer_source: AnswerSource,
     /// What evaluates trials.
     #[serde(default = "optimizer")]
     pub evaluation: Evaluation,
     /// Number of trials.
     #[serde(default = "fifteen")]
     #[schema(minimum = 1, maximum = 10000)]
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     #[serde(default)]
     pub solve_seconds_budget: Option<f64>,
@@ -101,8 +101,8 @@ pub struct NewStudy {
 fn yes() -> bool {
     true
 }
-fn automatic() -> FeedbackMode {
-    FeedbackMode::Automatic
+fn gait_rmse() -> AnswerSource {
+    AnswerSource::GaitRmse
 }
 fn optimizer() -> Evaluation {
     Evaluation::Optimizer
@@ -134,9 +134,9 @@ impl NewStudy {
             base_bounds: TunedBounds::default(),
             search_space: None,
             learner: LearnerSettings::default(),
-            feedback_mode: FeedbackMode::Automatic,
+            answer_source: AnswerSource::GaitRmse,
             evaluation: Evaluation::Optimizer,
-            trial_budget: fifteen(),
+            number_of_trials: fifteen(),
             solve_seconds_budget: None,
             unchanged_limit: None,
             repeat_results: None,
@@ -164,9 +164,9 @@ impl NewStudy {
             base_bounds: plan.base_bounds,
             search_space: Some(plan.search_space.clone().into()),
             learner: plan.learner.clone(),
-            feedback_mode: plan.feedback_mode,
+            answer_source: plan.answer_source,
             evaluation: plan.evaluation,
-            trial_budget: plan.trial_budget,
+            number_of_trials: plan.number_of_trials,
             solve_seconds_budget: plan.solve_seconds_budget,
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
@@ -319,9 +319,9 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
         solve_options: new.solve_options,
         base_bounds: new.base_bounds,
         search_space,
-        feedback_mode: new.feedback_mode,
+        answer_source: new.answer_source,
         evaluation: new.evaluation,
-        trial_budget: new.trial_budget,
+        number_of_trials: new.number_of_trials,
         solve_seconds_budget: new.solve_seconds_budget,
         unchanged_limit: new.unchanged_limit,
         repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
@@ -341,7 +341,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     printable::name("name", &plan.name, LONGEST_NAME)?;
-    check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
+    check_range("number_of_trials", i64::from(plan.number_of_trials), 1, 10_000)?;
     check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(plan.priority), -10, 10)?;
     if plan.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {

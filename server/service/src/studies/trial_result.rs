@@ -10,7 +10,7 @@ use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::gaits::PackedGait;
 use gaitwright_store::jobs::{FailureCounts, Lease};
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{TrialEnd, TrialState};
 use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, jobs, studies, trials};
 use serde_json::json;
@@ -181,7 +181,7 @@ async fn answers(
 ) -> Result<Vec<FeedbackContent>, Error> {
     let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
     let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
-    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+    if snapshot.study.plan.answer_source == AnswerSource::People {
         return Ok(Vec::new());
     }
     let standing_there = snapshot.clone();

@@ -30,7 +30,7 @@ struct ReproduceReport<'a> {
     pairs: Vec<SubjectFigures>,
 }
 
-/// The figures of a subject and seed.
+/// The results of a subject and seed.
 struct SubjectFigures {
     title: String,
     /// Figures 3b and 3c of the paper.

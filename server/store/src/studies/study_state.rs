@@ -6,7 +6,7 @@ use std::str::FromStr;
 use utoipa::ToSchema;
 
 /// State of a study: `not_started`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer from a
-/// person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied; `stopped`,
+/// person; `paused`, by a user or a program; `finished`, all trials are made or a stopping rule applied; `stopped`,
 /// by a user or a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -19,7 +19,7 @@ pub enum StudyState {
     Waiting,
     /// Paused by a person.
     Paused,
-    /// The budget is used up, or a stopping rule applied.
+    /// All trials are made, or a stopping rule applied.
     Finished,
     /// Stopped by a person.
     Stopped,

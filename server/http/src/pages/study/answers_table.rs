@@ -67,7 +67,7 @@ pub(crate) fn answer_in_words(row: &FeedbackRow, snapshot: &StudySnapshot) -> Op
         FeedbackContent::Preference { winner, loser } => {
             Some(format!("{} is better than {}", name(winner)?, name(loser)?))
         }
-        FeedbackContent::Tie { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
+        FeedbackContent::NoDifference { a, b } => Some(format!("no difference between {} and {}", name(a)?, name(b)?)),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }

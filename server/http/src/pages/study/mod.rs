@@ -24,7 +24,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Administer, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::devices::{self, Device};
@@ -53,7 +53,7 @@ struct StudyPage {
     sessions: Vec<(LabSessionId, u32)>,
     last_event: i64,
     variant: &'static str,
-    answers_by: &'static str,
+    answer_source: &'static str,
     may_administer: bool,
     /// Imports; empty if the study was created here.
     imports: Vec<Import>,
@@ -101,7 +101,8 @@ pub(super) async fn get(
     let (walks, trials) = (live.walker.has_place(), live.counts.total);
     let live = live.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = authorized.caller.may(Administer::NEEDED);
-    let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
+    let (variant, answer_source) =
+        (format::variant(study.plan.muscles), format::answer_source(study.plan.answer_source));
     page(&StudyPage {
         units,
         study,
@@ -114,7 +115,7 @@ pub(super) async fn get(
         sessions: sessions.iter().map(|session| (session.id, session.number)).collect(),
         last_event,
         variant,
-        answers_by,
+        answer_source,
         may_administer,
         imports,
     })

@@ -25,9 +25,9 @@ pub(super) struct TransitionButton {
 #[derive(Debug, Deserialize)]
 pub(in crate::pages) struct TransitionForm {
     transition: String,
-    /// The new total number of trials, for an extension.
+    /// The new number of trials, for an extension.
     #[serde(default)]
-    trial_budget: String,
+    number_of_trials: String,
 }
 
 /// `POST /studies/{id}/do`.
@@ -43,8 +43,8 @@ pub(in crate::pages) async fn post(
         .ok_or_else(|| Error::invalid("transition", form.transition, "start, pause, resume, stop or extend"))?;
     let mut writer = app.write().await?;
     let cancelled = if transition == StudyTransition::Extend {
-        let refused = || Error::invalid("trial_budget", form.trial_budget.as_str(), "a whole number");
-        let more = StudyExtension { trial_budget: form.trial_budget.trim().parse().map_err(|_| refused())? };
+        let refused = || Error::invalid("number_of_trials", form.number_of_trials.as_str(), "a whole number");
+        let more = StudyExtension { number_of_trials: form.number_of_trials.trim().parse().map_err(|_| refused())? };
         study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
         Vec::new()
     } else {

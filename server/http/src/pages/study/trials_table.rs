@@ -107,7 +107,7 @@ pub(super) struct TrialsTable {
     pub(super) any: bool,
     pub(super) choice: TrialsQuery,
     pub(super) states: Vec<StateChoice>,
-    pub(super) figures: Vec<Column>,
+    pub(super) values: Vec<Column>,
     pub(super) bounds: Vec<Column>,
     pub(super) rows: Vec<TrialRow>,
     /// Which trials are shown, if the page does not show all of them.
@@ -132,7 +132,7 @@ impl TrialsTable {
         Ok(Self {
             any: counts.total > 0,
             states: states(listing.state),
-            figures: columns(&choice, &listing, false)?,
+            values: columns(&choice, &listing, false)?,
             bounds: columns(&choice, &listing, true)?,
             extent: (matching < counts.total || shown < matching)
                 .then(|| extent(shown, listing.offset, matching, counts.total)),
@@ -201,8 +201,8 @@ fn trial_row(listed: ListedTrial) -> TrialRow {
         number: listed.number,
         state: listed.state.as_str(),
         state_words: words(listed.state.as_str()),
-        rmse: format::figure(listed.gait_rmse_rad),
-        cost: format::figure(listed.cost_of_transport),
+        rmse: format::decimal(listed.gait_rmse_rad),
+        cost: format::decimal(listed.cost_of_transport),
         iterations: listed.iterations.map_or_else(|| "–".to_owned(), |n| n.to_string()),
         seconds: format::seconds(listed.seconds_total),
         from: listed.from,

@@ -164,7 +164,7 @@ pub(crate) struct AuditDetail {
     /// `trial.ask`: name of the script.
     #[schema(required = false)]
     script: String,
-    /// Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.simulate`).
+    /// Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.report_execution`).
     #[schema(required = false)]
     seed: u64,
     /// `session.end`: the sign-in session.
@@ -207,7 +207,7 @@ pub(crate) struct AuditDetail {
     trial_b: TrialId,
     /// `trial.relax`: number of trials of the study.
     #[schema(required = false)]
-    trial_budget: u32,
+    number_of_trials: u32,
     /// `study.import`: whether the key of the signature is trusted.
     #[schema(required = false)]
     trusted: bool,
@@ -217,9 +217,9 @@ pub(crate) struct AuditDetail {
     /// Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.record`, `lab_session.walk`.
     #[schema(required = false)]
     walk: u8,
-    /// Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.simulate`.
+    /// Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.report_execution`.
     #[schema(required = false)]
-    walks: u32,
+    simulated_walks: u32,
     /// `trial.relax`: the trial without a gait whose bounds were relaxed.
     #[schema(required = false)]
     without_gait: TrialId,

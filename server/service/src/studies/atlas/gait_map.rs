@@ -147,7 +147,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::solved_action::GaitFigures;
+    use super::super::solved_action::GaitValues;
     use super::*;
     use gait_optimizer::{SolveStatus, UnchangedBound};
 
@@ -157,7 +157,7 @@ mod tests {
             let end = (!free.contains(&dimension.name.as_str())).then_some(value);
             UnchangedBound { bound: dimension.name.clone(), least: end, most: end }
         });
-        let gait = GaitFigures {
+        let gait = GaitValues {
             objective: 0.0,
             cost_of_transport: 0.0,
             gait_rmse_rad: 0.0,

@@ -6,7 +6,7 @@ mod progress_file;
 mod solved_action;
 
 pub use gait_map::{AtlasRow, GaitMap};
-pub use solved_action::{GaitFigures, SolvedAction};
+pub use solved_action::{GaitValues, SolvedAction};
 
 use super::bound_grid;
 use super::solve_input::SolveInput;

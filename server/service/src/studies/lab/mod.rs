@@ -29,6 +29,6 @@ pub use session::{
 pub use session_view::{LabSessionState, LabSessionView, WalkCondition, WalkView};
 pub use unblinding::unblind;
 pub use upload::{
-    CheckedFile, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, check_kept,
+    CheckedFile, EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles, UploadedFile, check_kept,
     read_upload, store_upload,
 };

@@ -176,7 +176,7 @@ pub async fn plan(
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LabSessionProgress {
     /// Identifier of the session.
-    pub session: LabSessionId,
+    pub lab_session_id: LabSessionId,
     /// Next walk, 1 to 3. Null after the last walk and in a closed session.
     pub walk: Option<u8>,
     /// Number of walks.
@@ -211,7 +211,7 @@ pub async fn session_progress(db: &mut Connection, id: LabSessionId) -> Result<L
     let session = still_shown(db, id).await?;
     let closed = session.done(SessionStep::Closed).is_some();
     Ok(LabSessionProgress {
-        session: id,
+        lab_session_id: id,
         walk: next_walk(&session).filter(|_| !closed && session.answer().is_none()),
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(SessionStep::Walk(walk))).map(|done| done.at),

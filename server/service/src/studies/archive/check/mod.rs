@@ -130,7 +130,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
             }
         }
         earlier.insert(trial.id);
-        at(&what, trial_results::figures(trial, &context.study.plan))?;
+        at(&what, trial_results::values(trial, &context.study.plan))?;
         let has_gait = at(&what, trial_results::gait(db, pool, trial, &context).await)?;
         unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
         at(&what, trial_results::check_results(db, trial).await)?;

@@ -3,18 +3,18 @@
 use gaitwright_store::rights::Right;
 
 /// A right as a type: what a handler asks for in its arguments.
-pub trait Permission: Send + Sync + 'static {
+pub trait RequiredRight: Send + Sync + 'static {
     /// The right; `None` if being signed in is sufficient.
     const NEEDED: Option<Right>;
 }
 
-macro_rules! permission {
+macro_rules! required_right {
     ($name:ident) => {
         #[doc = concat!("Asks for [`Right::", stringify!($name), "`].")]
         #[derive(Debug, Clone, Copy)]
         pub struct $name;
 
-        impl Permission for $name {
+        impl RequiredRight for $name {
             const NEEDED: Option<Right> = Some(Right::$name);
         }
     };
@@ -24,13 +24,13 @@ macro_rules! permission {
 #[derive(Debug, Clone, Copy)]
 pub struct AnyCaller;
 
-impl Permission for AnyCaller {
+impl RequiredRight for AnyCaller {
     const NEEDED: Option<Right> = None;
 }
 
-permission!(Read);
-permission!(Run);
-permission!(Answer);
-permission!(Rate);
-permission!(Device);
-permission!(Administer);
+required_right!(Read);
+required_right!(Run);
+required_right!(Answer);
+required_right!(Rate);
+required_right!(Device);
+required_right!(Administer);

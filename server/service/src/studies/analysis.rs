@@ -1,6 +1,6 @@
 //! Computes and caches the learner's posterior of a study, with marginals, the pooled gaits and agreement.
 
-use super::gait_beliefs::{GaitBelief, gait_beliefs};
+use super::gait_utilities::{GaitUtility, gait_utilities};
 use super::snapshot::StudySnapshot;
 use super::utility_history::{UtilityHistory, UtilityPoint};
 use gait_learner::{Agreement, Feedback, Learner, LearnerError, MainEffect, Marginal, Posterior};
@@ -22,7 +22,7 @@ const MOST_KEPT_TRIALS: usize = 2000;
 
 /// The posterior after a log, with everything that pages and REST show of it.
 #[derive(Debug)]
-pub struct Belief {
+pub struct Analysis {
     /// The posterior itself.
     pub posterior: Arc<Posterior>,
     /// For each dimension, the utility of its levels, averaged over all other dimensions.
@@ -30,23 +30,24 @@ pub struct Belief {
     /// For each dimension, how much it matters.
     pub main_effects: Vec<MainEffect>,
     /// The gaits that can be recommended, by decreasing utility, identical ones pooled.
-    pub gaits: Vec<GaitBelief>,
+    pub gaits: Vec<GaitUtility>,
     /// How many answers the posterior agrees with.
     pub agreement: Agreement,
     /// The answers that it does not agree with, the most surprising first.
-    pub unexpected_answers: Vec<UnexpectedAnswer>,
+    pub surprising_answers: Vec<SurprisingAnswer>,
 }
 
 /// An answer that the posterior does not agree with.
 #[derive(Debug)]
-pub struct UnexpectedAnswer {
+pub struct SurprisingAnswer {
     /// The answer.
     pub answer: FeedbackRow,
-    /// For a preference or suggestion, the probability that its order of utilities is right; `None` for a tie.
+    /// For a preference or suggestion, the probability that its order of utilities is right; `None` for an answer of no
+    /// difference.
     pub probability: Option<f64>,
 }
 
-impl Belief {
+impl Analysis {
     /// Derives the rest from the posterior of a study. CPU-bound.
     fn of(snapshot: &StudySnapshot, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
         let plan = &snapshot.study.plan;
@@ -56,24 +57,24 @@ impl Belief {
         Ok(Self {
             marginals,
             main_effects: main_effects.collect::<Result<_, _>>()?,
-            gaits: gait_beliefs(snapshot, &posterior)?,
+            gaits: gait_utilities(snapshot, &posterior)?,
             agreement: posterior.agreement(),
-            unexpected_answers: unexpected_answers(snapshot, &posterior)?,
+            surprising_answers: surprising_answers(snapshot, &posterior)?,
             posterior,
         })
     }
 }
 
-/// The comparisons that the posterior does not agree with, the most surprising first; ties last.
-fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<UnexpectedAnswer>, LearnerError> {
-    let mut unexpected_answers = Vec::new();
+/// The comparisons that the posterior does not agree with, the most surprising first; answers of no difference last.
+fn surprising_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<SurprisingAnswer>, LearnerError> {
+    let mut surprising_answers = Vec::new();
     for row in snapshot.feedback.iter().filter(|row| row.retraction.is_none()) {
         let Some(feedback) = snapshot.feedback_for_learner(&row.content) else { continue };
         let order = match feedback {
             Feedback::Label { .. } => continue,
             Feedback::Preference { winner, loser } => Some((winner, loser)),
             Feedback::Suggestion { suggested, over } => Some((suggested, over)),
-            Feedback::Tie { .. } => None,
+            Feedback::NoDifference { .. } => None,
         };
         if posterior.agrees_with(feedback) {
             continue;
@@ -82,10 +83,10 @@ fn unexpected_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result
             Some((winner, loser)) => Some(posterior.difference(winner, loser)?.probability_above_zero()),
             None => None,
         };
-        unexpected_answers.push(UnexpectedAnswer { answer: row.clone(), probability });
+        surprising_answers.push(SurprisingAnswer { answer: row.clone(), probability });
     }
-    unexpected_answers.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
-    Ok(unexpected_answers)
+    surprising_answers.sort_by(|a, b| a.probability.unwrap_or(1.0).total_cmp(&b.probability.unwrap_or(1.0)));
+    Ok(surprising_answers)
 }
 
 /// What is kept of the studies used last, the one used last at the end.
@@ -93,15 +94,15 @@ type Recent<T> = Mutex<VecDeque<(StudyId, Arc<Mutex<T>>)>>;
 
 /// Cache of recent posteriors and of the learners that computed them.
 #[derive(Debug, Default)]
-pub struct Beliefs {
+pub struct Analyses {
     learners: Recent<Learner>,
     posteriors: StudyCache<LogVersion, Posterior>,
     // A safety report changes which gaits can be recommended.
-    shown: StudyCache<(LogVersion, SafetyVersion), Belief>,
+    shown: StudyCache<(LogVersion, SafetyVersion), Analysis>,
     histories: Recent<UtilityHistory>,
 }
 
-impl Beliefs {
+impl Analyses {
     /// The posterior of a study, recomputed if the log has changed. CPU-bound.
     ///
     /// # Errors
@@ -129,13 +130,13 @@ impl Beliefs {
         kept_or_new(&self.learners, study, KEPT_LEARNERS)
     }
 
-    /// The belief of a study, recomputed if the log has changed. CPU-bound.
+    /// The analysis of a study, recomputed if the log has changed. CPU-bound.
     ///
     /// # Errors
     /// When the learner cannot work with the log.
-    pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Belief>, LearnerError> {
+    pub fn of(&self, pool: &OnPool, snapshot: &StudySnapshot) -> Result<Arc<Analysis>, LearnerError> {
         let version = (snapshot.version, snapshot.safety);
-        self.shown.get_or(snapshot.study.id, version, || Belief::of(snapshot, self.posterior(pool, snapshot)?))
+        self.shown.get_or(snapshot.study.id, version, || Analysis::of(snapshot, self.posterior(pool, snapshot)?))
     }
 
     /// The utility of the recommended gait after each answer of a person. Only the answers since the last call are

@@ -25,7 +25,7 @@ const GHOST_INSTANTS: usize = 51;
 
 /// A gait at its nodes, as a figure is drawn from it.
 #[derive(Debug, Clone)]
-pub struct WalkerFigure {
+pub struct GaitWalker {
     /// Poses by time.
     pub(super) figures: Vec<StickFigure>,
     /// Ground forces on left heel, left toe, right heel and right toe at each pose, N.
@@ -78,7 +78,7 @@ pub(super) struct Pose<'a> {
     pub(super) activations: Option<&'a [f64; 10]>,
 }
 
-impl WalkerFigure {
+impl GaitWalker {
     /// The figure of a gait.
     ///
     /// # Errors
@@ -160,7 +160,7 @@ impl WalkerFigure {
         let [x, y, width, height] = self.view_box();
         write!(
             svg,
-            "<svg class=\"gait-figure\" viewBox=\"{x} {y} {width} {height}\" role=\"img\" aria-label=\"{}\" data-force-scale=\"{:.2}\">",
+            "<svg class=\"gait-walker\" viewBox=\"{x} {y} {width} {height}\" role=\"img\" aria-label=\"{}\" data-force-scale=\"{:.2}\">",
             escape(label),
             self.force_scale_n()
         )?;
@@ -309,8 +309,8 @@ mod tests {
     use super::super::segment::tests::standing;
     use super::*;
 
-    fn on_both_feet() -> WalkerFigure {
-        WalkerFigure {
+    fn on_both_feet() -> GaitWalker {
+        GaitWalker {
             figures: vec![standing()],
             forces: vec![[[0.0, 300.0], [0.0, 100.0], [0.0, 0.0], [40.0, 400.0]]],
             activations: Some(vec![[0.2; 10]]),

@@ -1,4 +1,4 @@
-//! What the learner believes about the gaits of a study, identical gaits pooled.
+//! The utility of the gaits of a study, identical gaits pooled.
 
 use super::ranking::ranking;
 use super::same_motion::is_same_gait;
@@ -9,7 +9,7 @@ use gaitwright_store::trials::Trial;
 
 /// A gait that can be recommended.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GaitBelief {
+pub struct GaitUtility {
     /// The trials that have this gait, those with the highest utility first. Never empty.
     pub trials: Vec<TrialId>,
     /// Utility of the first of them.
@@ -26,7 +26,10 @@ pub fn is_distinguishable(difference: &Prediction) -> bool {
 
 /// The gaits without a safety report in force, by decreasing utility. The first is the recommended one. Trials with equal
 /// actions or identical gaits are one gait.
-pub(super) fn gait_beliefs(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<GaitBelief>, LearnerError> {
+pub(super) fn gait_utilities(
+    snapshot: &StudySnapshot,
+    posterior: &Posterior,
+) -> Result<Vec<GaitUtility>, LearnerError> {
     let ranked: Vec<&Trial> = ranking(snapshot, posterior)?.into_iter().filter_map(|id| snapshot.trial(id)).collect();
     let mut pools: Vec<Vec<&Trial>> = Vec::new();
     for trial in ranked {
@@ -37,19 +40,19 @@ pub(super) fn gait_beliefs(snapshot: &StudySnapshot, posterior: &Posterior) -> R
         }
     }
     let best = pools.first().map(|pool| pool[0].action_index);
-    let belief = |(place, pool): (usize, Vec<&Trial>)| {
+    let utility = |(place, pool): (usize, Vec<&Trial>)| {
         let action = pool[0].action_index;
         let behind = match best.filter(|_| place > 0) {
             Some(best) => Some(posterior.difference(best, action)?),
             None => None,
         };
-        Ok(GaitBelief {
+        Ok(GaitUtility {
             trials: pool.iter().map(|trial| trial.id).collect(),
             utility: posterior.predict(action)?,
             behind,
         })
     };
-    pools.into_iter().enumerate().map(belief).collect()
+    pools.into_iter().enumerate().map(utility).collect()
 }
 
 #[cfg(test)]

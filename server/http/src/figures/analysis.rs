@@ -1,4 +1,4 @@
-//! The figures of what the learner believes about the search space of a study.
+//! The figures of the page *Analysis*: the posterior of the learner over the search space of a study.
 
 use super::trials_by_bound::{by_bound, parallel};
 use crate::format::{meaning, percent, signed};
@@ -7,7 +7,7 @@ use gait_learner::{Dimension, LearnerError, Marginal, SearchSpace};
 use gaitwright_charts::{Chart, Figure, HeatMap, Stroke, Tile};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Belief, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analysis, MOST_ANSWERS};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::{Trial, TrialState};
@@ -36,34 +36,34 @@ pub(crate) struct DimensionChoice {
     pub(crate) y: bool,
 }
 
-/// Every figure of the page; empty if the page shows no belief.
+/// Every figure of the page; empty if the page shows no analysis.
 ///
 /// # Errors
 /// [`Error::Invalid`] for a bound that is not tuned, [`Error::NotFound`], or errors of the database and the learner.
 pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: AxisChoice) -> Result<Vec<Figure>, Error> {
-    let Believed::There(snapshot, belief) = believed(app, id).await? else { return Ok(Vec::new()) };
+    let AnalysisState::There(snapshot, analysis) = analysis_of(app, id).await? else { return Ok(Vec::new()) };
     let draw = move |_: &OnPool| {
-        let chosen = chosen(&belief, &choice)?;
-        let mut figures = marginals(&belief);
-        figures.extend(maps(&belief, &snapshot, chosen).map_err(Error::Learner)?.figures);
-        figures.extend(parallel(&snapshot, &belief).map_err(Error::Learner)?);
-        for dimension in 0..belief.posterior.space().dimensions().len() {
-            figures.extend(by_bound(&snapshot, &belief, dimension).map_err(Error::Learner)?);
+        let chosen = chosen(&analysis, &choice)?;
+        let mut figures = marginals(&analysis);
+        figures.extend(maps(&analysis, &snapshot, chosen).map_err(Error::Learner)?.figures);
+        figures.extend(parallel(&snapshot, &analysis).map_err(Error::Learner)?);
+        for dimension in 0..analysis.posterior.space().dimensions().len() {
+            figures.extend(by_bound(&snapshot, &analysis, dimension).map_err(Error::Learner)?);
         }
         Ok(figures)
     };
     app.compute(draw).await?
 }
 
-/// What the learner believes of a study, or why the page does not show it.
-pub(crate) enum Believed {
+/// The analysis of a study, or why the page does not show it.
+pub(crate) enum AnalysisState {
     Absent(String),
-    There(Box<StudySnapshot>, Arc<Belief>),
+    There(Box<StudySnapshot>, Arc<Analysis>),
 }
 
-pub(crate) async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed, Error> {
+pub(crate) async fn analysis_of(app: &mut AppState, id: StudyId) -> Result<AnalysisState, Error> {
     let too_many = |what: String| {
-        Ok(Believed::Absent(format!(
+        Ok(AnalysisState::Absent(format!(
             "This page is not available for studies with {what}, because the computation would take too long."
         )))
     };
@@ -77,21 +77,22 @@ pub(crate) async fn believed(app: &mut AppState, id: StudyId) -> Result<Believed
     let answers = snapshot.log().feedback.len();
     if answers == 0 {
         let why = "No results yet. The analysis appears after the first result.";
-        return Ok(Believed::Absent(why.to_owned()));
+        return Ok(AnalysisState::Absent(why.to_owned()));
     }
     if answers > MOST_ANSWERS {
         return too_many(format!("more than {MOST_ANSWERS} answers"));
     }
-    let beliefs = app.beliefs.clone();
-    let think =
-        move |pool: &OnPool| beliefs.of(pool, &snapshot).map(|belief| Believed::There(Box::new(snapshot), belief));
+    let analyses = app.analyses.clone();
+    let think = move |pool: &OnPool| {
+        analyses.of(pool, &snapshot).map(|analysis| AnalysisState::There(Box::new(snapshot), analysis))
+    };
     app.compute(think).await?.map_err(Error::Learner)
 }
 
 /// The two dimensions of the maps: the requested ones, by default those that matter most; `None` if there is only one
 /// dimension.
-pub(crate) fn chosen(belief: &Belief, choice: &AxisChoice) -> Result<Option<(usize, usize)>, Error> {
-    let names: Vec<&str> = belief.posterior.space().dimensions().iter().map(|d| d.name.as_str()).collect();
+pub(crate) fn chosen(analysis: &Analysis, choice: &AxisChoice) -> Result<Option<(usize, usize)>, Error> {
+    let names: Vec<&str> = analysis.posterior.space().dimensions().iter().map(|d| d.name.as_str()).collect();
     if names.len() < 2 {
         return Ok(None);
     }
@@ -103,7 +104,7 @@ pub(crate) fn chosen(belief: &Belief, choice: &AxisChoice) -> Result<Option<(usi
         }
     };
     let (x, y) = (place("x", &choice.x)?, place("y", &choice.y)?);
-    let ranked = ranked(belief);
+    let ranked = ranked(analysis);
     let other_than = |taken: Option<usize>| ranked.iter().copied().find(|place| Some(*place) != taken).unwrap_or(0);
     let x = x.unwrap_or_else(|| other_than(y));
     let y = y.unwrap_or_else(|| other_than(Some(x)));
@@ -114,18 +115,18 @@ pub(crate) fn chosen(belief: &Belief, choice: &AxisChoice) -> Result<Option<(usi
 }
 
 /// The dimensions by how much they matter, the most important first.
-pub(crate) fn ranked(belief: &Belief) -> Vec<usize> {
-    let mut ranked: Vec<usize> = (0..belief.main_effects.len()).collect();
-    let effect = |place: usize| belief.main_effects[place].difference.mean;
+pub(crate) fn ranked(analysis: &Analysis) -> Vec<usize> {
+    let mut ranked: Vec<usize> = (0..analysis.main_effects.len()).collect();
+    let effect = |place: usize| analysis.main_effects[place].difference.mean;
     ranked.sort_by(|a, b| effect(*b).total_cmp(&effect(*a)));
     ranked
 }
 
 /// All on one scale: what matters is which bound matters.
-pub(crate) fn marginals(belief: &Belief) -> Vec<Figure> {
+pub(crate) fn marginals(analysis: &Analysis) -> Vec<Figure> {
     let ends =
         |m: &Marginal| [m.average.mean - m.average.standard_deviation, m.average.mean + m.average.standard_deviation];
-    let all = || belief.marginals.iter().flatten().flat_map(ends);
+    let all = || analysis.marginals.iter().flatten().flat_map(ends);
     let range = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     let draw = |(dimension, levels): (&Dimension, &Vec<Marginal>)| {
         let line = levels.iter().map(|m| (m.value, m.average.mean)).collect();
@@ -141,15 +142,15 @@ pub(crate) fn marginals(belief: &Belief) -> Vec<Figure> {
         chart.x_ticks.clone_from(&dimension.values);
         Figure::chart("utility", chart)
     };
-    belief.posterior.space().dimensions().iter().zip(&belief.marginals).map(draw).collect()
+    analysis.posterior.space().dimensions().iter().zip(&analysis.marginals).map(draw).collect()
 }
 
 pub(crate) fn maps(
-    belief: &Belief,
+    analysis: &Analysis,
     snapshot: &StudySnapshot,
     chosen: Option<(usize, usize)>,
 ) -> Result<Maps, LearnerError> {
-    let space = belief.posterior.space();
+    let space = analysis.posterior.space();
     let dimensions = space.dimensions().iter().enumerate();
     let dimensions = dimensions
         .map(|(place, dimension)| DimensionChoice {
@@ -159,11 +160,11 @@ pub(crate) fn maps(
             y: chosen.is_some_and(|(_, y)| y == place),
         })
         .collect();
-    let (Some((right, down)), Some(best)) = (chosen, belief.posterior.best()) else {
+    let (Some((right, down)), Some(best)) = (chosen, analysis.posterior.best()) else {
         return Ok(Maps { dimensions, held: None, figures: Vec::new() });
     };
     let held = snapshot.trial_of(best).map(|trial| (trial.id, trial.number));
-    let slice = belief.posterior.slice(down, right, best)?;
+    let slice = analysis.posterior.slice(down, right, best)?;
     let at = |row: usize, column: usize| {
         let mut levels = space.levels(best);
         (levels[down], levels[right]) = (row, column);
@@ -182,7 +183,7 @@ pub(crate) fn maps(
                 below: format!("± {:.2}", prediction.standard_deviation),
                 framed,
             });
-            let chance = belief.posterior.probability_of_converging(action)?;
+            let chance = analysis.posterior.probability_of_converging(action)?;
             let below = tried(snapshot, space, [(down, row), (right, column)]);
             chances.push(Tile { value: chance, text: percent(chance), below, framed });
         }

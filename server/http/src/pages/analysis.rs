@@ -1,4 +1,4 @@
-//! The page *Analysis*: what the learner believes about the gaits and the bounds of a study, beside what was measured.
+//! The page *Analysis*: the utility of the gaits and bounds of a study, beside their Gait RMSE.
 
 use super::certainty::certainty;
 use super::page_chart::{PageChart, shared_legend};
@@ -6,11 +6,11 @@ use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::belief::{
-    AxisChoice, Believed, DimensionChoice, MAP_NOTES, Maps, believed, chosen, maps, marginals, ranked,
+use crate::figures::analysis::{
+    AnalysisState, AxisChoice, DimensionChoice, MAP_NOTES, Maps, analysis_of, chosen, maps, marginals, ranked,
 };
 use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
-use crate::format::{self, figure, meaning, percent};
+use crate::format::{self, decimal, meaning, percent};
 use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
@@ -19,11 +19,11 @@ use gait_learner::{Agreement, Prediction};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Belief, UnexpectedAnswer};
-use gaitwright_service::studies::gait_beliefs::{GaitBelief, is_distinguishable};
+use gaitwright_service::studies::analysis::{Analysis, SurprisingAnswer};
+use gaitwright_service::studies::gait_utilities::{GaitUtility, is_distinguishable};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::{FeedbackMode, Study};
+use gaitwright_store::studies::{AnswerSource, Study};
 use gaitwright_store::{StudyId, TrialId, studies};
 use std::cmp::Ordering;
 
@@ -33,15 +33,15 @@ const LISTED: usize = 24;
 const NAMED: usize = 6;
 
 #[derive(Template)]
-#[template(path = "belief.html")]
-struct BeliefPage {
+#[template(path = "analysis.html")]
+struct AnalysisPage {
     study: Study,
-    /// Why no belief is shown; `None` if it is shown.
+    /// Why no analysis is shown; `None` if it is shown.
     absent: Option<String>,
-    shown: Option<ShownBelief>,
+    shown: Option<ShownAnalysis>,
 }
 
-struct ShownBelief {
+struct ShownAnalysis {
     agreement: Agreement,
     /// How sure the recommendation is; `None` without one.
     certainty: Option<String>,
@@ -50,7 +50,7 @@ struct ShownBelief {
     gaits: Vec<GaitRow>,
     /// So many gaits are not in that list.
     more_gaits: usize,
-    bounds: Vec<BoundEffect>,
+    main_effects: Vec<MainEffectRow>,
     marginals: Vec<PageChart>,
     legend: Vec<(String, String)>,
     maps: Maps,
@@ -61,8 +61,8 @@ struct ShownBelief {
     parallel: Option<PageChart>,
     /// Whether some trials are not drawn.
     newest_only: bool,
-    unexpected_answers: Vec<UnexpectedAnswerRow>,
-    more_unexpected_answers: usize,
+    surprising_answers: Vec<SurprisingAnswerRow>,
+    more_surprising_answers: usize,
 }
 
 /// A gait, which one or several trials have.
@@ -76,8 +76,8 @@ struct GaitRow {
     worse: Option<String>,
 }
 
-/// How much a bound matters.
-struct BoundEffect {
+/// The main effect of a bound.
+struct MainEffectRow {
     name: String,
     limited: &'static str,
     /// Share of the largest effect.
@@ -88,13 +88,13 @@ struct BoundEffect {
     is_distinguishable: bool,
 }
 
-struct UnexpectedAnswerRow {
+struct SurprisingAnswerRow {
     text: String,
     source: &'static str,
     percent: String,
 }
 
-/// `GET /studies/{id}/belief`.
+/// `GET /studies/{id}/analysis`.
 pub(super) async fn get(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
@@ -102,20 +102,25 @@ pub(super) async fn get(
     Params(choice): Params<AxisChoice>,
 ) -> PageResult {
     let study = studies::get(&mut *app.read().await?, id).await?;
-    page(&match believed(&mut app, id).await? {
-        Believed::Absent(why) => BeliefPage { study, absent: Some(why), shown: None },
-        Believed::There(snapshot, belief) => {
-            let draw = move |_: &OnPool| show(id, &snapshot, &belief, &choice);
+    page(&match analysis_of(&mut app, id).await? {
+        AnalysisState::Absent(why) => AnalysisPage { study, absent: Some(why), shown: None },
+        AnalysisState::There(snapshot, analysis) => {
+            let draw = move |_: &OnPool| show(id, &snapshot, &analysis, &choice);
             let shown = app.compute(draw).await.map_err(Error::from)??;
-            BeliefPage { study, absent: None, shown: Some(shown) }
+            AnalysisPage { study, absent: None, shown: Some(shown) }
         }
     })
 }
 
-fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisChoice) -> Result<ShownBelief, Error> {
-    let pair = chosen(belief, choice)?;
-    let files = format!("/api/v1/studies/{id}/belief/figures");
-    let maps = maps(belief, snapshot, pair).map_err(Error::Learner)?;
+fn show(
+    id: StudyId,
+    snapshot: &StudySnapshot,
+    analysis: &Analysis,
+    choice: &AxisChoice,
+) -> Result<ShownAnalysis, Error> {
+    let pair = chosen(analysis, choice)?;
+    let files = format!("/api/v1/studies/{id}/analysis/figures");
+    let maps = maps(analysis, snapshot, pair).map_err(Error::Learner)?;
     let names =
         |asked: fn(&DimensionChoice) -> bool| maps.dimensions.iter().find(|d| asked(d)).map(|d| d.name.as_str());
     let query = match (names(|d| d.x), names(|d| d.y)) {
@@ -124,22 +129,22 @@ fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisCho
     };
     let drawn = |figure: &_| PageChart::of(figure, &files, "");
     let dimensions = pair.map_or_else(|| vec![0], |(x, y)| vec![x, y]);
-    let by_bound = dimensions.into_iter().map(|dimension| by_bound(snapshot, belief, dimension));
+    let by_bound = dimensions.into_iter().map(|dimension| by_bound(snapshot, analysis, dimension));
     let by_bound: Vec<_> = by_bound.collect::<Result<Vec<_>, _>>().map_err(Error::Learner)?;
     let charts = maps.figures.iter().zip(MAP_NOTES);
     let charts = charts.map(|(figure, note)| PageChart { note, ..PageChart::of(figure, &files, &query) }).collect();
-    let parallel = parallel(snapshot, belief).map_err(Error::Learner)?;
-    let mut marginals: Vec<PageChart> = marginals(belief).iter().map(drawn).collect();
+    let parallel = parallel(snapshot, analysis).map_err(Error::Learner)?;
+    let mut marginals: Vec<PageChart> = marginals(analysis).iter().map(drawn).collect();
     let results = snapshot.trials.iter().filter(|trial| trial.state.is_result()).count();
     // As on the page of the study: no recommendation before people have answered.
     let recommends = !snapshot.waits_for_first_answer();
-    Ok(ShownBelief {
-        agreement: belief.agreement,
-        certainty: certainty(snapshot, belief),
+    Ok(ShownAnalysis {
+        agreement: analysis.agreement,
+        certainty: certainty(snapshot, analysis),
         recommends,
-        gaits: belief.gaits.iter().take(LISTED).map(|gait| gait_row(gait, belief, snapshot)).collect(),
-        more_gaits: belief.gaits.len().saturating_sub(LISTED),
-        bounds: bounds(belief),
+        gaits: analysis.gaits.iter().take(LISTED).map(|gait| gait_row(gait, analysis, snapshot)).collect(),
+        more_gaits: analysis.gaits.len().saturating_sub(LISTED),
+        main_effects: main_effects(analysis),
         legend: shared_legend(&mut marginals),
         marginals,
         charts,
@@ -147,36 +152,36 @@ fn show(id: StudyId, snapshot: &StudySnapshot, belief: &Belief, choice: &AxisCho
         by_bound: by_bound.iter().flatten().map(drawn).collect(),
         parallel: parallel.as_ref().map(drawn),
         newest_only: results > DRAWN,
-        unexpected_answers: belief
-            .unexpected_answers
+        surprising_answers: analysis
+            .surprising_answers
             .iter()
             .take(LISTED)
-            .filter_map(|s| unexpected_answer_row(s, snapshot))
+            .filter_map(|s| surprising_answer_row(s, snapshot))
             .collect(),
-        more_unexpected_answers: belief.unexpected_answers.len().saturating_sub(LISTED),
+        more_surprising_answers: analysis.surprising_answers.len().saturating_sub(LISTED),
     })
 }
 
-fn gait_row(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> GaitRow {
+fn gait_row(gait: &GaitUtility, analysis: &Analysis, snapshot: &StudySnapshot) -> GaitRow {
     let trials = gait.trials.iter().filter_map(|id| snapshot.trial(*id));
     GaitRow {
-        rmse: figure(trials.clone().next().and_then(|trial| trial.gait_rmse_rad)),
+        rmse: decimal(trials.clone().next().and_then(|trial| trial.gait_rmse_rad)),
         trials: trials.take(NAMED).map(|trial| (trial.id, trial.number)).collect(),
         more_trials: gait.trials.len().saturating_sub(NAMED),
         utility: format::utility(&gait.utility),
         worse: gait
             .behind
-            .map(|behind| worse(gait, belief, snapshot).map_or_else(|| believed_worse(&behind), str::to_owned)),
+            .map(|behind| worse(gait, analysis, snapshot).map_or_else(|| worse_by_utility(&behind), str::to_owned)),
     }
 }
 
 /// What Gait RMSE says of a gait beside the recommended one. `None` if it does not answer the comparisons alone.
-fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option<&'static str> {
-    if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+fn worse(gait: &GaitUtility, analysis: &Analysis, snapshot: &StudySnapshot) -> Option<&'static str> {
+    if snapshot.study.plan.answer_source != AnswerSource::GaitRmse {
         return None;
     }
-    let rmse = |gait: &GaitBelief| snapshot.trial(*gait.trials.first()?)?.gait_rmse_rad;
-    let (own, recommended) = (rmse(gait)?, rmse(belief.gaits.first()?)?);
+    let rmse = |gait: &GaitUtility| snapshot.trial(*gait.trials.first()?)?.gait_rmse_rad;
+    let (own, recommended) = (rmse(gait)?, rmse(analysis.gaits.first()?)?);
     Some(match own.total_cmp(&recommended) {
         Ordering::Greater => "yes, by Gait RMSE",
         Ordering::Equal => "equal Gait RMSE",
@@ -184,7 +189,7 @@ fn worse(gait: &GaitBelief, belief: &Belief, snapshot: &StudySnapshot) -> Option
     })
 }
 
-fn believed_worse(behind: &Prediction) -> String {
+fn worse_by_utility(behind: &Prediction) -> String {
     let percent = percent(behind.probability_above_zero());
     if is_distinguishable(behind) {
         format!("yes ({percent} sure)")
@@ -194,14 +199,14 @@ fn believed_worse(behind: &Prediction) -> String {
 }
 
 /// The bounds with several values, the one that matters most first.
-fn bounds(belief: &Belief) -> Vec<BoundEffect> {
-    let dimensions = belief.posterior.space().dimensions();
-    let ranked = ranked(belief);
-    let largest = ranked.first().map_or(0.0, |place| belief.main_effects[*place].difference.mean);
+fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
+    let dimensions = analysis.posterior.space().dimensions();
+    let ranked = ranked(analysis);
+    let largest = ranked.first().map_or(0.0, |place| analysis.main_effects[*place].difference.mean);
     let row = |place: usize| {
-        let effect = &belief.main_effects[place];
+        let effect = &analysis.main_effects[place];
         let name = &dimensions[place].name;
-        BoundEffect {
+        MainEffectRow {
             limited: meaning(name),
             name: name.clone(),
             share: if largest > 0.0 { effect.difference.mean / largest } else { 0.0 },
@@ -214,13 +219,13 @@ fn bounds(belief: &Belief) -> Vec<BoundEffect> {
     ranked.into_iter().filter(|place| dimensions[*place].values.len() > 1).map(row).collect()
 }
 
-fn unexpected_answer_row(unexpected: &UnexpectedAnswer, snapshot: &StudySnapshot) -> Option<UnexpectedAnswerRow> {
-    let text = match unexpected.answer.content {
+fn surprising_answer_row(surprising: &SurprisingAnswer, snapshot: &StudySnapshot) -> Option<SurprisingAnswerRow> {
+    let text = match surprising.answer.content {
         FeedbackContent::Suggestion { over, .. } => {
             format!("the suggested bounds are better than those of trial {}", snapshot.trial(over)?.number)
         }
-        _ => answer_in_words(&unexpected.answer, snapshot)?,
+        _ => answer_in_words(&surprising.answer, snapshot)?,
     };
-    let percent = unexpected.probability.map_or_else(|| "–".to_owned(), percent);
-    Some(UnexpectedAnswerRow { text, source: format::source(&unexpected.answer), percent })
+    let percent = surprising.probability.map_or_else(|| "–".to_owned(), percent);
+    Some(SurprisingAnswerRow { text, source: format::source(&surprising.answer), percent })
 }
