@@ -52,7 +52,7 @@ pub(super) struct TuneCommand {
     warm_start_from: WarmStartFrom,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
-    /// Print one JSON object at the end instead of a line for each trial.
+    /// Print one JSON object at the end, and the line of each trial to stderr.
     #[arg(long)]
     json: bool,
 }

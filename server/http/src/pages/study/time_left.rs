@@ -19,6 +19,9 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
     }
     let solves: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
     let left = study.plan.number_of_trials.saturating_sub(results);
+    if left == 0 {
+        return "All trials have been solved.".to_owned();
+    }
     let Some(median) = median(&solves) else {
         let missing = FEWEST_SOLVES - solves.len();
         if left as usize <= missing {
