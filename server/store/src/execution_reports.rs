@@ -82,7 +82,7 @@ pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u6
         .map(|row| {
             // Seeds of requests are at most 2^53.
             let seed: i64 = row.try_get("seed")?;
-            Ok((row.try_get("id")?, row.try_get("walks")?, seed.cast_unsigned()))
+            Ok((row.try_get("id")?, row.try_get("simulated_walks")?, seed.cast_unsigned()))
         })
         .collect()
 }
