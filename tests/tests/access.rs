@@ -384,7 +384,7 @@ async fn wrong_passwords_wait_longer_each_time_and_are_audited() {
     assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 100).await.unwrap();
     let count = |change: &str| rows.iter().filter(|row| row.change == change).count();
-    assert_eq!((count("session.refuse"), count("session.wait")), (4, 1));
+    assert_eq!((count("sign_in.refused"), count("sign_in.delay")), (4, 1));
     assert_eq!(rows[0].detail["failed_attempts_of_network"], 5);
     service.stop().await;
 }

@@ -384,7 +384,7 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     assert_eq!(told.json()["pairs"][0]["shown_first"], json!(sides(&service.store, study).await[0].0));
     assert!(!told.text.contains(code));
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
-    assert_eq!((rows[0].change.as_str(), &rows[0].detail["reason"]), ("study.unblind", &json!("adverse event")));
+    assert_eq!((rows[0].change.as_str(), &rows[0].detail["reason"]), ("study.unblind_rater", &json!("adverse event")));
     loop {
         service.wait_for(study, &[StudyState::Waiting]).await;
         if !post(&rater, &next, json!({})).await.json()["pair"].is_null() {

@@ -171,7 +171,7 @@ async fn trial_is_certified_once() {
     assert_eq!(certificate["passed"].as_bool(), Some(certificate["failures"].as_array().unwrap().is_empty()));
     assert_eq!(service.fetch(&address).await.json(), certificate);
     let audit = service.fetch("/api/v1/audit").await.text;
-    assert_eq!(["ask_certificate", "trial.certify"].map(|act| audit.matches(act).count()), [1, 1], "{audit}");
+    assert_eq!(["request_certificate", "trial.certify"].map(|act| audit.matches(act).count()), [1, 1], "{audit}");
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     let word = if certificate["passed"] == true { ">passed<" } else { ">failed<" };
     assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");
@@ -261,7 +261,7 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     assert_eq!((&other["report"]["seed"], other["report"]["grounds"] == report["grounds"]), (&json!(4), false));
     let audit = service.fetch("/api/v1/audit").await.text;
     assert_eq!(
-        ["ask_execution_report", "trial.report_execution"].map(|act| audit.matches(act).count()),
+        ["request_execution_report", "trial.report_execution"].map(|act| audit.matches(act).count()),
         [2, 2],
         "{audit}"
     );

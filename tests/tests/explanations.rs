@@ -134,7 +134,7 @@ async fn repeated_requests_give_one_explanation() {
     assert_eq!(keyed().await.status, StatusCode::ACCEPTED, "the same request has the same answer");
     assert_eq!(counts.begun.load(Ordering::SeqCst), 1);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    assert_eq!(trail.iter().filter(|row| row.change == "trial.ask_explanation").count(), 1);
+    assert_eq!(trail.iter().filter(|row| row.change == "trial.request_explanation").count(), 1);
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();
     assert_eq!((told.len(), &told[0].payload["relaxed_bound"]), (1, &json!("a5")));

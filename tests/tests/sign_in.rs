@@ -346,7 +346,7 @@ async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
     abort_attempts(&service, "192.0.2.66", (0..30_000).map(|_| "admin".to_owned())).await;
     let page = send(&service, &admin, &Method::GET, "/users", "", "").await.text;
     assert!(page.contains("192.0.2.66") && page.contains("30000"), "{page}");
-    let noted = trail(&service, "session.wait").await;
+    let noted = trail(&service, "sign_in.delay").await;
     assert_eq!(noted[0].detail["failed_attempts_of_network"], 20_000);
     assert!(noted.len() < 20, "{}", noted.len());
 
@@ -356,7 +356,7 @@ async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
     let tomorrow = now().plus_seconds(25 * 3600);
     let _ = back_off::begin(&mut writer, tomorrow, "Ada", origin).await.unwrap();
     commit(writer).await.unwrap();
-    let forgotten = trail(&service, "session.refused").await;
+    let forgotten = trail(&service, "sign_in.failures").await;
     assert_eq!(
         (&forgotten[0].detail["network"], &forgotten[0].detail["failed_attempts"]),
         (&json!("192.0.2.66"), &json!(30_000))

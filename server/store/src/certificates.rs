@@ -66,7 +66,7 @@ pub async fn requested(db: &mut Connection) -> StoreResult<Vec<TrialId>> {
 }
 
 /// The change in the audit trail that requests a certificate.
-pub const REQUESTED: &str = "trial.ask_certificate";
+pub const REQUESTED: &str = "trial.request_certificate";
 
 /// State of the certificate of a converged gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,7 +11,7 @@ use sqlx::Row;
 /// Kind of the event with a report.
 pub const REPORTED: &str = "execution_reported";
 /// The change in the audit trail that requests a report.
-pub const REQUESTED: &str = "trial.ask_execution_report";
+pub const REQUESTED: &str = "trial.request_execution_report";
 /// The change in the audit trail that stores a report.
 pub const STORED: &str = "trial.report_execution";
 

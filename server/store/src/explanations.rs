@@ -9,7 +9,7 @@ use sqlx::Row;
 use std::collections::BTreeSet;
 
 /// The change in the audit trail that requests an explanation.
-pub const REQUESTED: &str = "trial.ask_explanation";
+pub const REQUESTED: &str = "trial.request_explanation";
 
 /// A stored explanation.
 #[derive(Debug, Clone, PartialEq)]

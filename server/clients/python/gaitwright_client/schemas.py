@@ -349,9 +349,9 @@ AuditDetail = TypedDict(
         "could_have_known": "bool",
         # `gait.review`: the decision.
         "decision": "SafetyDecision",
-        # `session.refused`: number of failed attempts of the network.
+        # `sign_in.failures`: number of failed attempts of the network.
         "failed_attempts": "int",
-        # `session.refuse`, `session.wait`: number of failed attempts of the network so far.
+        # `sign_in.refused`, `sign_in.delay`: number of failed attempts of the network so far.
         "failed_attempts_of_network": "int",
         # `trial.certify`: reasons of a failed certificate; otherwise empty.
         "failures": "list[str]",
@@ -359,7 +359,7 @@ AuditDetail = TypedDict(
         "file": "str",
         # `study.import`: SHA-256 of the archive, hexadecimal.
         "file_sha256": "str",
-        # `session.refused`: time of the first attempt.
+        # `sign_in.failures`: time of the first attempt.
         "first_at": "Instant",
         # `subject.consent`: the consent form.
         "form": "str",
@@ -372,9 +372,9 @@ AuditDetail = TypedDict(
         "height_m": "Optional[float]",
         # `study.prune`: trials whose gaits were kept.
         "kept": "list[TrialId]",
-        # Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.record`).
+        # Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.upload`).
         "kind": "AuditedKind",
-        # `session.refused`: time of the last attempt.
+        # `sign_in.failures`: time of the last attempt.
         "last_at": "Instant",
         # Identifier of the member: `study.member_add`, `study.member_end`.
         "member": "MemberId",
@@ -382,9 +382,9 @@ AuditDetail = TypedDict(
         "muscles": "MuscleParameters",
         # Name of the object, of the member, or of the user who tried to sign in.
         "name": "str",
-        # `session.refused`: number of different names that were tried.
+        # `sign_in.failures`: number of different names that were tried.
         "names": "int",
-        # Network of the address: `session.refuse`, `session.refused`, `session.wait`.
+        # Network of the address: `sign_in.refused`, `sign_in.failures`, `sign_in.delay`.
         "network": "str",
         # Note about the answer, walk or session.
         "note": "str",
@@ -404,11 +404,11 @@ AuditDetail = TypedDict(
         "priority": "int",
         # `subject.add`: the pseudonym.
         "pseudonym": "str",
-        # Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind`.
+        # Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind_rater`.
         "rater": "str",
         # Reason for the change, or why an answer was not used. Null if none was given.
         "reason": "Optional[str]",
-        # `lab_session.record`: the measurement file.
+        # `lab_session.upload`: the measurement file.
         "recording": "MeasurementFileId",
         # `lab_session.process`: the measurement files that were processed.
         "recordings": "list[MeasurementFileId]",
@@ -424,21 +424,21 @@ AuditDetail = TypedDict(
         "safety_reports": "list[AuditedSafetyReport]",
         # `record.backup`: true.
         "scheduled": "bool",
-        # `token.make`: scopes of the token.
+        # `token.create`: scopes of the token.
         "scopes": "list[Right]",
         # `trial.ask`: name of the script.
         "script": "str",
-        # Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.report_execution`).
+        # Seed of the study (`study.create`) or of simulated walks (`trial.request_execution_report`, `trial.report_execution`).
         "seed": "int",
         # `session.end`: the sign-in session.
         "session": "SessionId",
         # `lab_session.process`: filters.
         "settings": "EmgSettings",
-        # `lab_session.record`: SHA-256 of the file, hexadecimal.
+        # `lab_session.upload`: SHA-256 of the file, hexadecimal.
         "sha256": "str",
         # `study.import`: public key of the signature, hexadecimal. Null without a signature.
         "signed_by": "Optional[str]",
-        # Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.report_execution`.
+        # Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
         "simulated_walks": "int",
         # State, as in `StudyState` (`study.create`, `study.extend`) or `TrialState` (`trial.tell`).
         "state": "str",
@@ -462,7 +462,7 @@ AuditDetail = TypedDict(
         "trusted": "bool",
         # `study.import`: number of gaits whose Gait RMSE could not be computed again.
         "unchecked_rmse": "int",
-        # Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.record`, `lab_session.walk`.
+        # Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.upload`, `lab_session.record_walk`.
         "walk": "int",
         # `trial.relax`: the trial without a gait whose bounds were relaxed.
         "without_gait": "TrialId",

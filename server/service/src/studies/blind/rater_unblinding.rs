@@ -88,6 +88,6 @@ pub async fn unblind(
         ));
     }
     let detail = json!({ "rater": rater, "reason": reason });
-    audit::append(writer, &caller.actor, "study.unblind", &format!("study {study}"), &detail).await?;
+    audit::append(writer, &caller.actor, "study.unblind_rater", &format!("study {study}"), &detail).await?;
     Ok(pairs.iter().map(UnblindedPair::from).collect())
 }

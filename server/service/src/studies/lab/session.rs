@@ -259,7 +259,7 @@ pub async fn record_walk(
     }
     lab_sessions::add_step(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });
-    audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
+    audit::append(writer, actor, "lab_session.record_walk", &format!("lab session {id}"), &detail).await?;
     session_progress(writer, id).await
 }
 

@@ -355,6 +355,6 @@ pub async fn store_upload(
     }
     let added = measurement_files::insert(writer, actor, id, walk, &checked.packed).await?;
     let detail = json!({ "walk": walk, "kind": added.kind, "recording": added.id, "sha256": added.raw_sha256 });
-    audit::append(writer, actor, "lab_session.record", &format!("lab session {id}"), &detail).await?;
+    audit::append(writer, actor, "lab_session.upload", &format!("lab session {id}"), &detail).await?;
     Ok(added)
 }
