@@ -3589,13 +3589,13 @@ class Withdrawal(TypedDict):
     reason: str
 
 
-class Workers(TypedDict):
-    """Workers of the service."""
+class Worker(TypedDict):
+    """A worker that runs solves."""
 
-    # Number of running solves by worker.
-    at_work: dict[str, int]
-    # Number of solves that can run in parallel.
-    places: int
+    # Name of the worker.
+    name: str
+    # Number of solves that it is running.
+    running_solves: int
 
 
 # Values before a change: settings of a study, height and mass of a subject, or the role of a user.

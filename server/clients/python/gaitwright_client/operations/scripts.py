@@ -42,7 +42,7 @@ class ScriptsMethods(Transport):
         )
 
     def tell_outcome(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None, **body: Unpack[Tell]) -> Trial:
-        """Report the outcome of a trial.
+        """Tell the outcome of a trial.
 
         An outcome without a gait is also a result. If the script fails, cancel the trial instead.
 
