@@ -366,7 +366,7 @@ async fn corrected_height_and_mass_apply_to_new_studies_only() {
     let blank = r#"{"height_m": 1.7, "body_mass_kg": 70, "reason": " "}"#;
     assert_eq!(correct(blank).await.status, StatusCode::UNPROCESSABLE_ENTITY);
     let right = r#"{"height_m": 1.75, "body_mass_kg": 71.5, "reason": "misread the scale"}"#;
-    assert_eq!(correct(right).await.status, StatusCode::OK);
+    assert_eq!(correct(right).await.status, StatusCode::CREATED);
     assert_eq!(correct(right).await.status, StatusCode::CONFLICT, "nothing would change");
 
     let shown = fetch(format!("/api/v1/subjects/{subject}")).await.json();

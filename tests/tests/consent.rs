@@ -62,7 +62,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
 
     let of_subject = format!("/api/v1/subjects/{person}");
     let given = service.post(&format!("{of_subject}/consents"), &json!({"form": "version 3"})).await;
-    assert_eq!(given.status, StatusCode::OK, "{}", given.text);
+    assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
     let empty = service.post(&format!("{of_subject}/withdraw"), &json!({"reason": " "})).await;
     assert_eq!(empty.status, StatusCode::UNPROCESSABLE_ENTITY);
     let converged = service.trials(finished).await;

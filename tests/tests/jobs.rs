@@ -120,10 +120,14 @@ async fn requested_certificate_is_computed_after_a_restart_unless_cancelled() {
     // If the study continued, it would end and certify its best gaits by itself.
     service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
     let (kept, cancelled) = (converged[0].id, converged[1].id);
-    let mut jobs = Vec::new();
-    for trial in [kept, cancelled] {
-        jobs.push(address(&service.post(&format!("/api/v1/trials/{trial}/certificate"), &json!({})).await));
-    }
+    // The button on the page does not wait for the certificate.
+    let button = format!("/trials/{kept}/certify");
+    let pressed = service.post_text(&button, "application/x-www-form-urlencoded", "").await;
+    assert_eq!(pressed.status, StatusCode::SEE_OTHER, "{}", pressed.text);
+    let page = service.fetch(&format!("/trials/{kept}")).await.text;
+    assert!(page.contains(&format!("data-job=\"certificate-{kept}\"")) && !page.contains(&button), "{page}");
+    let mut jobs = vec![format!("/api/v1/jobs/certificate-{kept}")];
+    jobs.push(address(&service.post(&format!("/api/v1/trials/{cancelled}/certificate"), &json!({})).await));
     assert_eq!(service.post(&format!("{}/cancel", jobs[1]), &json!({})).await.status, StatusCode::OK);
     service.stop().await;
 

@@ -448,7 +448,7 @@ async fn emg_recordings_are_compared_with_normal_walking_and_can_be_reprocessed(
     let same = service.post(&bring, &with_heel(3, &electromyogram(1.5))).await;
     assert!(same.status == StatusCode::CONFLICT && same.text.contains("already uploaded for walk 2"), "{}", same.text);
     let done = service.post(&format!("{api}/emg-results"), &json!({})).await;
-    assert_eq!(done.status, StatusCode::OK, "{}", done.text);
+    assert_eq!(done.status, StatusCode::CREATED, "{}", done.text);
     let walks = done.json()["result"]["walks"].as_array().unwrap().clone();
     let used: Vec<_> = walks.iter().map(|walk| walk["walk"].clone()).collect();
     assert_eq!(used, [json!(1), json!(2)], "the newest recording of each walk");

@@ -303,6 +303,51 @@ fn every_list_has_the_same_envelope_and_the_same_parameters() {
     assert!(lists > 20, "{lists}");
 }
 
+/// Lists of the service begin with the newest entry, and lists of one object with its first. Others say by what they are
+/// sorted.
+#[test]
+fn every_list_states_its_order() {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut lists = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        let operation = &item["get"];
+        if !operation["operationId"].as_str().is_some_and(|name| name.starts_with("list_")) {
+            continue;
+        }
+        let text = operation["description"].as_str().unwrap_or_default().replace('\n', " ").to_lowercase();
+        let usual = if path.contains("{id}") { "oldest first" } else { "newest first" };
+        let other = if path.contains("{id}") { "newest first" } else { "oldest first" };
+        let states = text.contains(usual) || text.contains("sorted by") || text.contains("sorted as");
+        assert!(states && !text.contains(other), "{path}: {text}");
+        lists += 1;
+    }
+    assert!(lists > 25, "{lists}");
+}
+
+/// The first word of an operation says what it does, and which success it has: 201 and the address of what it makes, 202
+/// and the job, or 200.
+#[test]
+fn operation_is_named_by_what_it_does_and_responds_accordingly() {
+    let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
+    let mut made = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let what = format!("{method} {path}");
+            let verb = operation["operationId"].as_str().unwrap().split('_').next().unwrap();
+            let summary = operation["summary"].as_str().unwrap().to_lowercase();
+            let said = summary.split(' ').next().unwrap();
+            assert!(said == verb || (verb, said) == ("get", "download"), "{what}: {verb}, but {summary}");
+            let has = |status: &str| !operation["responses"][status].is_null();
+            let (makes, defers) =
+                (["create", "clone", "ask", "draw"].contains(&verb), ["request", "retry"].contains(&verb));
+            assert_eq!((has("201"), has("202")), (makes, defers), "{what}");
+            assert!(method == "get" || !["get", "list", "follow"].contains(&verb), "{what}");
+            made += usize::from(makes);
+        }
+    }
+    assert!(made > 20, "{made}");
+}
+
 /// Generators make a method of each: `list_studies`, `withdraw_consent`.
 #[test]
 fn operation_identifiers_are_unique() {

@@ -159,7 +159,7 @@ async fn lab_script_does_not_receive_bounds_of_unsafe_gaits() {
     service.post(&format!("/api/v1/trials/{}/cancel", open["id"].as_str().unwrap()), &json!({})).await;
     for study in [first, second, third] {
         let given = ask(study).await;
-        assert_eq!(given.status, StatusCode::OK, "{}", given.text);
+        assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
         assert_ne!(given.json()["action"], json!(reported.action));
     }
     service.stop().await;

@@ -37,8 +37,9 @@ async fn run(service: &Service, study: StudyId, script: &str, trials: usize) -> 
     let mut done = Vec::new();
     for _ in 0..trials {
         let asked = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({ "script": script })).await;
-        assert_eq!(asked.status, StatusCode::OK, "{}", asked.text);
+        assert_eq!(asked.status, StatusCode::CREATED, "{}", asked.text);
         let trial = asked.json();
+        assert_eq!(asked.headers["location"], format!("/api/v1/trials/{}", trial["id"].as_str().unwrap()));
         let rmse = 0.1 + (trial["action"]["a5"].as_f64().unwrap() - 0.026).abs();
         let told = json!({"outcome": "converged", "gait_rmse_rad": rmse});
         let told = service.post(&format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap()), &told).await;
@@ -94,7 +95,8 @@ async fn proposal_stays_with_its_worker() {
     let ask = format!("/api/v1/studies/{study}/ask");
     let of = |script: &str| json!({ "script": script });
     let left = service.post(&ask, &of("left")).await.json();
-    assert_eq!(service.post(&ask, &of("left")).await.json(), left);
+    let again = service.post(&ask, &of("left")).await;
+    assert_eq!((again.status, again.json()), (StatusCode::OK, left.clone()));
     let right = service.post(&ask, &of("right")).await.json();
     assert_ne!(right["id"], left["id"]);
     assert_ne!(right["action_index"], left["action_index"]);
@@ -184,7 +186,13 @@ async fn finished_study_is_extended_cloned_and_compared() {
     );
     let cloned: StudyId = clone["id"].as_str().unwrap().parse().unwrap();
     service.wait_for(cloned, &[StudyState::Finished]).await;
-    let both = service.fetch(&format!("/api/v1/study-comparison?ids={study},{cloned}")).await.items();
+    let computed = service.scheduler.analyses().computed();
+    let comparison = format!("/api/v1/study-comparison?ids={study},{cloned}");
+    let first = service.fetch(&format!("{comparison}&limit=1")).await.json();
+    assert!(service.scheduler.analyses().computed() <= computed + 1, "a page needs the posteriors of its studies only");
+    let next = format!("{comparison}&limit=1&cursor={}", first["next"].as_str().unwrap());
+    let both = service.fetch(&comparison).await.items();
+    assert_eq!((&first["items"][0], &service.fetch(&next).await.items()[0]), (&both[0], &both[1]));
     assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
     assert!(both[0]["best_gait_rmse_rad"].is_f64());
     for ids in [study.to_string(), format!("{study},{study}")] {
@@ -236,7 +244,7 @@ async fn people_compare_trials_of_a_lab_script() {
         StatusCode::CREATED
     );
     service.wait_for(study, &[StudyState::Running]).await;
-    assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::OK);
+    assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::CREATED);
     service.stop().await;
 }
 

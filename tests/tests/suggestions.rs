@@ -137,8 +137,9 @@ async fn queued_jobs_and_workers_are_listed() {
     let running = jobs.as_array().unwrap().iter().find(|job| job["state"] == "running").unwrap();
     assert_eq!((&running["study_id"], &running["solve"]["attempts"]), (&json!(study), &json!(1)));
     assert!(running["solve"]["lease_until"].is_string());
-    let workers = service.fetch("/api/v1/workers").await.json();
-    assert_eq!(workers["places"], 1);
+    let workers = service.fetch("/api/v1/workers").await.items();
+    assert_eq!(workers.as_array().unwrap().len(), 1);
+    assert_eq!((&workers[0]["name"], &workers[0]["running_solves"]), (&running["solve"]["worker"], &json!(1)));
     service.stop().await;
 }
 

@@ -41,7 +41,7 @@ pub enum LinearSolver {
     #[default]
     Auto,
     /// Supernodal LBL^T with Bunch-Kaufman pivoting inside supernodes; one dense front for matrices of order up to 120.
-    /// Needs the feature `supernodal`, as do larger problems without elimination blocks.
+    /// Needs the feature `supernodal`, as do larger problems without elimination blocks; without it, it is refused.
     Supernodal,
     /// Static multifrontal LBL^T over the elimination blocks, with Bunch-Kaufman pivoting inside fronts.
     Multifrontal,
@@ -157,7 +157,8 @@ impl NlpSettings {
     /// Checks every range.
     ///
     /// # Errors
-    /// [`NlpError::InvalidSetting`] names the first field out of range, its value and the range.
+    /// [`NlpError::InvalidSetting`] names the first field out of range, its value and the range; [`NlpError::NotBuiltIn`]
+    /// names a setting that needs a missing feature.
     pub fn validate(&self) -> Result<(), NlpError> {
         let positive = |field: &'static str, value: f64| in_range(field, value, f64::MIN_POSITIVE, f64::MAX);
         positive("tolerance", self.tolerance)?;
@@ -175,7 +176,18 @@ impl NlpSettings {
         positive("hessian_regularisation_first", self.hessian_regularisation_first)?;
         in_range("proximal_first", self.proximal_first, 0.0, 1e4)?;
         in_range("required_reduction", self.required_reduction, 0.0, 0.999_999)?;
-        in_range("threads", self.threads as f64, 1.0, 16.0)
+        in_range("threads", self.threads as f64, 1.0, 16.0)?;
+        self.linear_solver.validate()
+    }
+}
+
+impl LinearSolver {
+    /// Refuses a factorisation that this build does not have.
+    fn validate(self) -> Result<(), NlpError> {
+        if self == Self::Supernodal && !cfg!(feature = "supernodal") {
+            return Err(NlpError::NotBuiltIn { field: "linear_solver", value: "supernodal", feature: "supernodal" });
+        }
+        Ok(())
     }
 }
 
@@ -194,5 +206,17 @@ mod infinite_as_null {
 
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
         Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factorisation_that_is_not_built_in_is_refused() {
+        let settings = NlpSettings { linear_solver: LinearSolver::Supernodal, ..NlpSettings::default() };
+        assert_eq!(settings.validate().is_ok(), cfg!(feature = "supernodal"));
+        assert!(NlpSettings::default().validate().is_ok());
     }
 }

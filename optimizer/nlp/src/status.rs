@@ -187,6 +187,16 @@ pub enum NlpError {
         /// Largest allowed value.
         high: f64,
     },
+    /// A setting needs a feature that this build lacks.
+    #[error("setting {field} is {value}, for which this program was built without the feature {feature}")]
+    NotBuiltIn {
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        value: &'static str,
+        /// The feature.
+        feature: &'static str,
+    },
     /// The problem is inconsistent.
     #[error("invalid problem: {0}")]
     InvalidProblem(String),

@@ -55,7 +55,6 @@ mod static_files;
 mod units;
 pub mod unwritten_access;
 mod visible;
-mod workers;
 
 pub use client_address::ClientAddress;
 pub use forwarded::{Proxies, ProxyHeaders};

@@ -107,6 +107,12 @@ impl<K: Serialize, F> Paging<K, F> {
 }
 
 impl<F> Paging<usize, F> {
+    /// [`Self::cut_by_place`], with at most `most` entries on the page: those that a request can compute.
+    pub(crate) fn cut_by_place_to<T>(mut self, rows: Vec<T>, most: u32) -> Result<Page<T>, Error> {
+        self.limit = self.limit.min(most);
+        self.cut_by_place(rows)
+    }
+
     /// The page of a computed list, whose entries are identified by their positions.
     pub(crate) fn cut_by_place<T>(&self, rows: Vec<T>) -> Result<Page<T>, Error> {
         Ok(self.cut(rows.into_iter().enumerate().collect(), |(place, _)| *place)?.map(|(_, row)| row))

@@ -428,7 +428,8 @@ AuditDetail = TypedDict(
         "scopes": "list[Right]",
         # `trial.ask`: name of the script.
         "script": "str",
-        # Seed of the study (`study.create`) or of simulated walks (`trial.request_execution_report`, `trial.report_execution`).
+        # Seed of the study (`study.create`) or of simulated walks (`trial.request_execution_report`,
+        # `trial.report_execution`).
         "seed": "int",
         # `session.end`: the sign-in session.
         "session": "SessionId",
@@ -3591,13 +3592,13 @@ class WarmStart(_WarmStartRequired, total=False):
     margins: TightenedBounds
 
 
-class Workers(TypedDict):
-    """Workers of the service."""
+class Worker(TypedDict):
+    """A worker that runs solves."""
 
-    # Number of running solves by worker.
-    at_work: dict[str, int]
-    # Number of solves that can run in parallel.
-    places: int
+    # Name of the worker.
+    name: str
+    # Number of solves that it is running.
+    running_solves: int
 
 
 # Values before a change: settings of a study, height and mass of a subject, or the role of a user.

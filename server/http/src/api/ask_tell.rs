@@ -9,7 +9,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab_script::{self, AskRequest, TellRequest};
+use gaitwright_service::studies::lab_script::{self, AskRequest, SuggestedTrial, TellRequest};
 use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Deserialize;
@@ -25,7 +25,7 @@ use std::sync::Arc;
     tag = "scripts",
     params(("id" = StudyId, Path, description = "Identifier of a study with `evaluation` = `script`")),
     request_body(content = AskRequest, description = "Optional: the name of the script"),
-    responses((status = 200, description = "Trial to evaluate", body = Trial)),
+    responses((status = 200, description = "Trial that the script was already asked to evaluate", body = Trial), (status = 201, description = "New trial to evaluate", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn ask(
@@ -41,8 +41,14 @@ pub(super) async fn ask(
             Ok(writer) => writer,
             Err(before) => return repeat_ask(&app, before).await,
         };
-        if let Some(trial) = lab_script::assign(&mut writer, &request.caller, script, &suggestion?).await? {
-            return request.done(&app, writer, &Trial::from(trial)).await;
+        let suggestion = suggestion?;
+        if let Some(trial) = lab_script::assign(&mut writer, &request.caller, script, &suggestion).await? {
+            let location = format!("/api/v1/trials/{}", trial.id);
+            let trial = Trial::from(trial);
+            return match suggestion {
+                SuggestedTrial::New(..) => request.created(&app, writer, location, &trial).await,
+                SuggestedTrial::Same(_) => request.done(&app, writer, &trial).await,
+            };
         }
     }
     Err(has_changed().into())
@@ -60,7 +66,7 @@ async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusa
     Ok(before)
 }
 
-/// Report the outcome of a trial
+/// Tell the outcome of a trial
 ///
 /// An outcome without a gait is also a result. If the script fails, cancel the trial instead.
 #[utoipa::path(

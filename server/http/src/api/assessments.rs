@@ -40,7 +40,7 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(all, |assessment| assessment.id)?.map(Assessment::from)))
 }
 
-/// Record an assessment of two gaits
+/// Create an assessment of two gaits
 ///
 /// States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
 /// recommended, compared or planned for lab sessions until staff have cleared the gait.

@@ -15,13 +15,13 @@ use gaitwright_service::job::JobId;
 use gaitwright_service::studies::job_status;
 use gaitwright_store::BackupId;
 
-/// Back up the record
+/// Request a backup
 ///
 /// Writes a backup next to the database and verifies it. The backup is completed even if the caller disconnects.
 #[utoipa::path(
     post,
     path = "/backups",
-    operation_id = "create_backup",
+    operation_id = "request_backup",
     tag = "operation",
     responses((status = 202, description = "Job that makes the backup, which takes seconds to minutes", body = Job)),
     security(("token" = ["administer"]), ("session" = ["administer"])),

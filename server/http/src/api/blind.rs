@@ -13,7 +13,10 @@ use axum::extract::{Path, State};
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Rate, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::blind::{self, AnswerReceipt, RaterAnswer, RaterReliability, UnblindedPair};
+use gaitwright_service::studies::blind::{
+    self, AnswerReceipt, HandedOut, RaterAnswer, RaterReliability, UnblindedPair,
+};
+use gaitwright_store::allocations::PairWithSides;
 use gaitwright_store::{StudyId, gaits, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -38,7 +41,7 @@ pub(super) struct NextBlindPair {
     pair: Option<BlindPair>,
 }
 
-/// Get the next pair for a rater
+/// Draw the next pair for a rater
 ///
 /// Returns the same pair until it is answered.
 #[utoipa::path(
@@ -47,7 +50,7 @@ pub(super) struct NextBlindPair {
     operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "Pair, or null if no comparison is pending", body = NextBlindPair)),
+    responses((status = 200, description = "Pair that was drawn earlier, or null if no comparison is pending", body = NextBlindPair), (status = 201, description = "New pair. `Location` is its first motion", body = NextBlindPair)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn next(
@@ -59,14 +62,19 @@ pub(super) async fn next(
         return Ok(before);
     }
     let answering = app.clone();
-    let (writer, shown) = blind::next(app.store_mut(), &request.caller, id).await?;
-    let pair = shown.map(|shown| BlindPair {
-        first: format!("/api/v1/blind-pairs/{}/motions/first", shown.pair.code),
-        second: format!("/api/v1/blind-pairs/{}/motions/second", shown.pair.code),
-        code: shown.pair.code,
-        number: shown.pair.number,
-    });
-    request.done(&answering, writer, &NextBlindPair { pair }).await
+    let (writer, next) = blind::next(app.store_mut(), &request.caller, id).await?;
+    let Some(HandedOut { shown: PairWithSides { pair, .. }, is_new }) = next else {
+        return request.done(&answering, writer, &NextBlindPair { pair: None }).await;
+    };
+    let motion = |side: &str| format!("/api/v1/blind-pairs/{}/motions/{side}", pair.code);
+    let (first, second) = (motion("first"), motion("second"));
+    let pair = BlindPair { first: first.clone(), second, code: pair.code, number: pair.number };
+    let next = NextBlindPair { pair: Some(pair) };
+    if is_new {
+        request.created(&answering, writer, first, &next).await
+    } else {
+        request.done(&answering, writer, &next).await
+    }
 }
 
 /// Motion to compare.
@@ -154,9 +162,10 @@ pub(super) async fn answer(
     request.done(&app, writer, &answered).await
 }
 
-/// Get the reliability of raters
+/// List raters with their reliability
 ///
 /// Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
+/// Sorted by name.
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",

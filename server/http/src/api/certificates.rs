@@ -14,7 +14,7 @@ use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
-use gaitwright_service::studies::certification;
+use gaitwright_service::studies::certificate_request;
 use gaitwright_store::{TrialId, certificates};
 
 /// Get the certificate of a trial
@@ -63,9 +63,6 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let exists = certification::ask(&mut writer, &request.actor, id).await?;
-    if !exists && !app.scheduler.certify(id) {
-        return Err(Error::NotReady("This service does not certify gaits.".to_owned()).into());
-    }
+    certificate_request::ask(&mut writer, &app.scheduler, &request.actor, id).await?;
     Job::respond(&request, &app, writer, JobId::Certificate(id)).await
 }

@@ -37,7 +37,7 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |one| Reverse(one.id))?.map(Device::from)))
 }
 
-/// Add a device from a data file
+/// Create a device from a data file
 ///
 /// If a device with the same definition exists, the response contains it.
 #[utoipa::path(

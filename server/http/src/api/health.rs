@@ -18,7 +18,7 @@ pub struct Health {
     pub version: &'static str,
 }
 
-/// Check that the service is healthy
+/// Get the health of the service
 ///
 /// Succeeds if the database responds. Requires no sign-in. It reveals nothing about solves, because a rater could infer
 /// the effect of an answer from them.

@@ -19,9 +19,9 @@ use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::{StudyId, studies};
 use std::sync::Arc;
 
-/// Get the history of the recommendation
+/// List the history of the recommendation
 ///
-/// The best trial after each iteration of the study, that is, after each result.
+/// The best trial after each iteration of the study, that is, after each result. Sorted by iteration.
 #[utoipa::path(
     get,
     path = "/studies/{id}/history",

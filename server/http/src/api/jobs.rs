@@ -7,14 +7,13 @@ use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
 use crate::resources::jobs::OpenSolve;
 use crate::visible::Visible;
-use crate::workers::Workers;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
-use gaitwright_store::{BorrowedWriter, StudyId, TrialId};
+use gaitwright_store::{BorrowedWriter, StudyId, TrialId, jobs};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -98,7 +97,7 @@ pub(super) struct JobFilter {
 
 /// List jobs
 ///
-/// Jobs that have not ended: backups, and those of studies that the caller can access.
+/// Jobs that have not ended: backups, and those of studies that the caller can access. Sorted by kind and age.
 #[utoipa::path(
     get,
     path = "/jobs",
@@ -171,17 +170,33 @@ pub(super) async fn cancel(
     Ok(answer)
 }
 
+/// A worker that runs solves.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct Worker {
+    /// Name of the worker.
+    name: String,
+    /// Number of solves that it is running.
+    running_solves: u32,
+}
+
 /// List workers
 ///
-/// A remote worker is listed only while it runs a solve.
+/// The workers that are running solves. Sorted by name.
 #[utoipa::path(
     get,
     path = "/workers",
-    operation_id = "get_workers",
+    operation_id = "list_workers",
     tag = "operation",
-    responses((status = 200, description = "Workers", body = Workers)),
+    responses((status = 200, description = "A page", body = Page<Worker>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn workers(_: Authorized<Read>, State(app): State<AppState>) -> Result<Json<Workers>, Refusal> {
-    Ok(Json(Workers::read(&app).await?))
+pub(super) async fn workers(
+    _: Authorized<Read>,
+    State(app): State<AppState>,
+    paging: Paging<String>,
+) -> Result<Json<Page<Worker>>, Refusal> {
+    // Names of workers reveal nothing about studies.
+    let running = jobs::by_worker(&mut *app.read().await?).await?;
+    let all = running.into_iter().map(|(name, running_solves)| Worker { name, running_solves }).collect();
+    Ok(Json(paging.cut(all, |worker| worker.name.clone())?))
 }

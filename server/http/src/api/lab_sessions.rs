@@ -30,7 +30,7 @@ fn view(session: &LabSession) -> LabSessionView {
 
 /// List lab sessions of a study
 ///
-/// The response omits blinded data.
+/// The response omits blinded data. Sorted by number.
 #[utoipa::path(
     get,
     path = "/studies/{id}/lab-sessions",
@@ -52,14 +52,14 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(all, |session| session.number)?.map(|session| view(&session))))
 }
 
-/// Plan a lab session
+/// Create a lab session
 ///
 /// The session consists of a walk without the device, then one with each gait. The order of the gaits is drawn at random
 /// when the session is planned, and concealed.
 #[utoipa::path(
     post,
     path = "/studies/{id}/lab-sessions",
-    operation_id = "plan_lab_session",
+    operation_id = "create_lab_session",
     tag = "lab",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = NewLabSession,
@@ -274,7 +274,7 @@ pub(super) async fn walk(
     request.done(&app, writer, &next).await
 }
 
-/// Record the answer of the subject
+/// Answer a lab session
 ///
 /// States which walk was better, that there is no difference, that the subject cannot tell, or that a walk was unsafe. The
 /// answer reaches the learner at unblinding; a safety report takes effect at once.

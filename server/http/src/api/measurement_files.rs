@@ -95,13 +95,13 @@ pub(super) async fn content(
     Ok(answer)
 }
 
-/// Upload an EMG recording of a walk
+/// Create a measurement file with EMG
 ///
 /// An incomplete file, or one without a complete stride, is refused.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/measurement-files/emg",
-    operation_id = "add_emg_file",
+    operation_id = "create_emg_file",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
     request_body = NewEmg,
@@ -120,13 +120,13 @@ pub(super) async fn emg(
     keep(&app, id, &request, &checked).await
 }
 
-/// Upload joint angles of a walk
+/// Create a measurement file with joint angles
 ///
 /// Limit cycles are computed from the file.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/measurement-files/joint-angles",
-    operation_id = "add_joint_angle_file",
+    operation_id = "create_joint_angle_file",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
     request_body = NewJointAngles,
@@ -177,17 +177,17 @@ fn of_settings(error: Error) -> Error {
     }
 }
 
-/// Process EMG recordings
+/// Create an EMG result
 ///
-/// Filters, segments and normalises the newest EMG recordings. Can be repeated with other settings.
+/// Processes EMG recordings: filters, segments and normalises the newest EMG recordings. Can be repeated with other settings.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/emg-results",
-    operation_id = "process_emg",
+    operation_id = "create_emg_result",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
     request_body = EmgProcessing,
-    responses((status = 200, description = "Result", body = EmgView)),
+    responses((status = 201, description = "Result", body = EmgView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn process(
@@ -205,7 +205,8 @@ pub(super) async fn process(
         Err(before) => return Ok(before),
     };
     lab::keep_result(&mut writer, &request.actor, id, &view.result).await?;
-    request.done(&app, writer, &EmgView::from(view)).await
+    let location = format!("/api/v1/lab-sessions/{id}/emg-results");
+    request.created(&app, writer, location, &EmgView::from(view)).await
 }
 
 /// Get the processed EMG
@@ -230,9 +231,9 @@ pub(super) async fn result(
     Ok(Json(found.ok_or_else(missing)?.into()))
 }
 
-/// Get limit cycles
+/// List limit cycles
 ///
-/// Angle and velocity of every recorded joint, from the newest joint angles of each walk.
+/// Angle and velocity of every recorded joint, from the newest joint angles of each walk. Sorted by walk.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/limit-cycles",

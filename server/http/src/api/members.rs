@@ -20,7 +20,7 @@ use utoipa::ToSchema;
 ///
 /// Raters can access studies of which they are members. Clinicians, and tokens with any scope other than `rate`, can
 /// access every unrestricted study, and the restricted studies of which they are members. A request for any other study
-/// is answered with 404.
+/// is answered with 404. Oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/members",
@@ -59,13 +59,13 @@ pub(super) async fn access(
     Ok(Json(StudyRestriction { restricted }))
 }
 
-/// Add a member to a study
+/// Create a study member
 ///
 /// Assigns a rater, or adds a clinician or a token.
 #[utoipa::path(
     post,
     path = "/studies/{id}/members",
-    operation_id = "add_study_member",
+    operation_id = "create_study_member",
     tag = "access",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = NewMember,
@@ -143,7 +143,7 @@ pub(super) struct StudyRestriction {
     restricted: bool,
 }
 
-/// Restrict or open a study
+/// Set the access restriction of a study
 ///
 /// Restricts the study to members and administrators, or opens it to all staff. The caller who restricts it becomes a
 /// member.
@@ -188,13 +188,13 @@ pub(super) struct CreatedRaterInvitation {
     path: String,
 }
 
-/// Invite a rater
+/// Create an invitation of a rater
 ///
 /// Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
 #[utoipa::path(
     post,
     path = "/studies/{id}/invitations",
-    operation_id = "invite_rater",
+    operation_id = "create_invitation",
     tag = "access",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = RaterInvitation,

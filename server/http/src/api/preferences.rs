@@ -133,7 +133,7 @@ pub(super) struct CreatedPreference {
     other_answers: Vec<FeedbackId>,
 }
 
-/// Record a preference
+/// Create a preference
 ///
 /// Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author can
 /// give only one answer per pair of gaits; to change an answer, retract it first.

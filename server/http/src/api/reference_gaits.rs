@@ -36,7 +36,7 @@ pub(super) async fn list(
     Ok(Json(paging.cut(all, |one| Reverse(one.id))?.map(ReferenceGait::from)))
 }
 
-/// Import a reference gait from a recording
+/// Create a reference gait from a recording
 ///
 /// Segments the recording at right heel strikes and averages its strides. If the recording was already imported, the
 /// response contains the existing reference gait.
@@ -91,9 +91,9 @@ pub(super) async fn get(
     Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?.into()))
 }
 
-/// Rank reference gaits for a subject
+/// List the nearest reference gaits of a subject
 ///
-/// The nearest in height and body mass first. Those without height and mass come last.
+/// Sorted by distance in height and body mass, the nearest first. Those without height and mass come last.
 #[utoipa::path(
     get,
     path = "/subjects/{id}/reference-gaits",

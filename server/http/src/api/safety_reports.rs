@@ -56,7 +56,7 @@ impl From<ReportedGait> for SafetyReport {
 ///
 /// Includes safety reports from raters, assessments and lab sessions, and reports about a single gait. A report stays
 /// in the list after its gait is cleared for walking. A report from a blinded lab session
-/// is listed for both of its gaits.
+/// is listed for both of its gaits. Oldest first.
 #[utoipa::path(
     get,
     path = "/studies/{id}/safety-reports",
@@ -81,7 +81,7 @@ pub(super) async fn of_study(
     Ok(Json(paging.cut(all, at)?))
 }
 
-/// Report a gait as unsafe
+/// Create a safety report
 ///
 /// Until staff have cleared the gait, neither the gait nor any other trial of the subject with the same motion is
 /// recommended, compared or used for walking. The report does not reach the learner.
@@ -116,7 +116,7 @@ pub(super) async fn report(
     request.created(&app, writer, location, &SafetyReport::from(made)).await
 }
 
-/// Review the safety reports of a gait
+/// Create a review of safety reports
 ///
 /// If the gait is cleared, it can again be recommended, compared and used in lab sessions, and the preferences derived
 /// from the reports are retracted. If a lab session with a report about the gait is unblinded later, that report makes

@@ -81,7 +81,7 @@ impl SensitivityToBound {
 /// Get the sensitivities of a trial
 ///
 /// How the results of a gait change, to first order, with each tuned bound. Computed on request from the stored
-/// solution.
+/// solution, for meshes of up to 80 intervals (`gait_settings.mesh`, in sum).
 #[utoipa::path(
     get,
     path = "/trials/{id}/sensitivities",

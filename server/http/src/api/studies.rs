@@ -295,7 +295,7 @@ pub(super) async fn patch(
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
-/// Raise the number of trials of a study
+/// Extend a study
 ///
 /// If the study has ended, it resumes.
 #[utoipa::path(

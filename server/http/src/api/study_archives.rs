@@ -26,7 +26,7 @@ use tokio_stream::wrappers::ReceiverStream;
 /// Size of the chunks of a response.
 const CHUNK_BYTES: usize = 1 << 16;
 
-/// Export a study as an archive
+/// Download a study as an archive
 ///
 /// The archive has every row of the study, without concealed allocations, as `gaitwright export` writes it.
 #[utoipa::path(
@@ -98,7 +98,8 @@ impl Write for Chunks {
 
 /// List the imports of a study
 ///
-/// One entry for each time the study was imported into a record. Empty if the study was created in this record.
+/// One entry for each time the study was imported into a record, oldest first. Empty if the study was created in this
+/// record.
 #[utoipa::path(
     get,
     path = "/studies/{id}/imports",

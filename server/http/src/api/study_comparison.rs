@@ -15,7 +15,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan_schemas;
 use gaitwright_service::studies::trial_choice::ranking_to_show;
-use gaitwright_store::studies::{self, StudyState};
+use gaitwright_store::studies::{self, Study, StudyState};
 use gaitwright_store::{ReferenceGaitId, StudyId, consents, trials};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -23,6 +23,8 @@ use utoipa::ToSchema;
 
 /// Maximum number of compared studies.
 const MOST: usize = 20;
+/// Maximum number on a page, whatever its `limit`: a request waits for the posterior of each.
+const MOST_ON_A_PAGE: u32 = 5;
 
 /// Studies to compare.
 #[derive(Debug, Deserialize)]
@@ -64,16 +66,17 @@ pub(super) struct StudyComparison {
     solve_seconds: f64,
 }
 
-/// Compare several studies
+/// List compared studies
 ///
-/// Results keep the order of `ids`.
+/// Properties and results of several studies. A page has at most 5 studies, because each needs a posterior. Sorted as in
+/// `ids`.
 #[utoipa::path(
     get,
     path = "/study-comparison",
-    operation_id = "list_study_comparisons",
+    operation_id = "list_compared_studies",
     tag = "studies",
     params(("ids" = String, Query, description = "2 to 20 comma-separated identifiers of different studies")),
-    responses((status = 200, description = "One row for each study", body = Page<StudyComparison>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
+    responses((status = 200, description = "A page", body = Page<StudyComparison>), (status = 404, description = "A study does not exist"), (status = 409, description = "The subject of a study withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
@@ -81,34 +84,41 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     paging: Paging<usize, ComparisonQuery>,
 ) -> Result<Json<Page<StudyComparison>>, Refusal> {
-    let which = &paging.filter;
-    let named: Vec<&str> = which.ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
-    if !(2..=MOST).contains(&named.len()) {
-        return Err(
-            Error::invalid("ids", which.ids.as_str(), &format!("2 to {MOST} comma-separated identifiers")).into()
-        );
-    }
-    let mut rows: Vec<StudyComparison> = Vec::with_capacity(named.len());
-    for id in named {
-        let id: Named<StudyId> = id.parse().map_err(|_| Error::invalid("ids", id, "the identifier of a study"))?;
-        let id = id.accessible(&mut *app.read().await?, authorized.caller.reach()).await?;
-        if rows.iter().any(|row| row.id == id) {
-            return Err(Error::invalid("ids", which.ids.as_str(), "identifiers of different studies").into());
+    let mut compared: Vec<Study> = Vec::new();
+    for id in identifiers(&paging.filter.ids)? {
+        let mut reader = app.read().await?;
+        let id = id.accessible(&mut reader, authorized.caller.reach()).await?;
+        if compared.iter().any(|study| study.id == id) {
+            return Err(Error::invalid("ids", paging.filter.ids.as_str(), "identifiers of different studies").into());
         }
-        rows.push(row(&mut app, id).await?);
+        consents::may_be_shown(&mut reader, id).await?;
+        compared.push(studies::get(&mut reader, id).await?);
     }
-    if rows.windows(2).any(|pair| pair[0].reference_gait_id != pair[1].reference_gait_id) {
-        for row in &mut rows {
-            row.best_gait_rmse_rad = None;
-        }
+    let one_reference =
+        compared.windows(2).all(|pair| pair[0].plan.reference_gait_id == pair[1].plan.reference_gait_id);
+    let (asked, next) = paging.cut_by_place_to(compared, MOST_ON_A_PAGE)?.into_parts();
+    let mut rows = Vec::with_capacity(asked.len());
+    for study in asked {
+        let mut row = row(&mut app, study).await?;
+        row.best_gait_rmse_rad = row.best_gait_rmse_rad.filter(|_| one_reference);
+        rows.push(row);
     }
-    Ok(Json(paging.cut_by_place(rows)?))
+    Ok(Json(Page::of_parts(rows, next)))
 }
 
-async fn row(app: &mut AppState, id: StudyId) -> Result<StudyComparison, Refusal> {
+/// The identifiers in the query.
+fn identifiers(ids: &str) -> Result<Vec<Named<StudyId>>, Error> {
+    let named: Vec<&str> = ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
+    if !(2..=MOST).contains(&named.len()) {
+        return Err(Error::invalid("ids", ids, &format!("2 to {MOST} comma-separated identifiers")));
+    }
+    let read = |id: &str| id.parse().map_err(|_| Error::invalid("ids", id, "the identifier of a study"));
+    named.into_iter().map(read).collect()
+}
+
+async fn row(app: &mut AppState, study: Study) -> Result<StudyComparison, Refusal> {
+    let id = study.id;
     let mut reader = app.read().await?;
-    let study = studies::get(&mut reader, id).await?;
-    consents::may_be_shown(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);

@@ -56,7 +56,7 @@ pub(super) async fn get(
     Ok(Json(subjects::get(&mut *app.read().await?, id).await?.into()))
 }
 
-/// Add a subject
+/// Create a subject
 #[utoipa::path(
     post,
     path = "/subjects",
@@ -103,15 +103,17 @@ pub(super) async fn consents(
     Ok(Json(paging.cut(all, |consent| consent.seq)?.map(Consent::from)))
 }
 
-/// Record consent
+/// Create a consent
+///
+/// Records that the subject consented.
 #[utoipa::path(
     post,
     path = "/subjects/{id}/consents",
-    operation_id = "record_consent",
+    operation_id = "create_consent",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     request_body = NewConsent,
-    responses((status = 200, description = "Consent", body = Consent)),
+    responses((status = 201, description = "Consent", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn consent(
@@ -124,7 +126,7 @@ pub(super) async fn consent(
         Err(before) => return Ok(before),
     };
     let row = consent::give(&mut writer, &request.actor, id, &new).await?;
-    request.done(&app, writer, &Consent::from(row)).await
+    request.created(&app, writer, format!("/api/v1/subjects/{id}/consents"), &Consent::from(row)).await
 }
 
 /// Withdraw consent
@@ -182,17 +184,17 @@ pub(super) async fn corrections(
     Ok(Json(paging.cut(all, |correction| correction.seq)?.map(Correction::from)))
 }
 
-/// Correct the height and mass of a subject
+/// Create a correction of a subject
 ///
-/// New studies use the corrected values. Existing studies keep theirs.
+/// Corrects height and mass. New studies use the corrected values. Existing studies keep theirs.
 #[utoipa::path(
     post,
     path = "/subjects/{id}/corrections",
-    operation_id = "correct_subject",
+    operation_id = "create_subject_correction",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     request_body = NewCorrection,
-    responses((status = 200, description = "Correction", body = Correction)),
+    responses((status = 201, description = "Correction", body = Correction)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn correct(
@@ -205,7 +207,7 @@ pub(super) async fn correct(
         Err(before) => return Ok(before),
     };
     let row = subject::correct(&mut writer, &request.actor, id, &new).await?;
-    request.done(&app, writer, &Correction::from(row)).await
+    request.created(&app, writer, format!("/api/v1/subjects/{id}/corrections"), &Correction::from(row)).await
 }
 
 /// Get measured muscle values of a subject

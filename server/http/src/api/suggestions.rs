@@ -39,7 +39,7 @@ pub(super) async fn of_study(
     Ok(Json(paging.page(rows, |row| row.seq)?.map(Preference::from)))
 }
 
-/// Record a suggestion
+/// Create a suggestion
 ///
 /// The learner uses it like a preference. Retract it with `POST /api/v1/preferences/{id}/retract`.
 #[utoipa::path(

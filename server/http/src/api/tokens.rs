@@ -14,6 +14,7 @@ use gaitwright_service::access::Administer;
 use gaitwright_service::access::tokens::{self as making, NewToken};
 use gaitwright_store::{TokenId, tokens};
 use serde::Serialize;
+use std::cmp::Reverse;
 use utoipa::ToSchema;
 
 /// New token.
@@ -28,7 +29,7 @@ pub(super) struct CreatedToken {
 
 /// List tokens
 ///
-/// Oldest first.
+/// Newest first.
 #[utoipa::path(
     get,
     path = "/tokens",
@@ -40,10 +41,11 @@ pub(super) struct CreatedToken {
 pub(super) async fn list(
     _: Authorized<Administer>,
     State(app): State<AppState>,
-    paging: Paging<TokenId>,
+    paging: Paging<Reverse<TokenId>>,
 ) -> Result<Json<Page<Token>>, Refusal> {
-    let all = tokens::all(&mut *app.read().await?).await?;
-    Ok(Json(paging.cut(all, |one| one.id)?.map(Token::from)))
+    let mut all = tokens::all(&mut *app.read().await?).await?;
+    all.reverse();
+    Ok(Json(paging.cut(all, |one| Reverse(one.id))?.map(Token::from)))
 }
 
 /// Get a token

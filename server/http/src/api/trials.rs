@@ -183,7 +183,8 @@ pub(super) async fn retry(
 
 /// List iterations of a solve
 ///
-/// The iterations of the running solve so far, or the recorded ones of a solve that has ended.
+/// The iterations of the running solve so far, or the recorded ones of a solve that has ended. Sorted by
+/// iteration.
 #[utoipa::path(
     get,
     path = "/trials/{id}/iterations",
@@ -210,7 +211,7 @@ pub(super) async fn iterations(
 
 /// List attempts at a trial
 ///
-/// Results delivered by workers, including results that arrived too late to count.
+/// Results delivered by workers, including results that arrived too late to count. Sorted by attempt.
 #[utoipa::path(
     get,
     path = "/trials/{id}/attempts",

@@ -15,6 +15,7 @@ use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_service::access::{Administer, Right, Role};
 use gaitwright_store::{UserId, users};
 use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
 use utoipa::ToSchema;
 
 /// Caller of the request.
@@ -47,7 +48,7 @@ pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<CurrentUser>, 
 
 /// List users
 ///
-/// Oldest first.
+/// Newest first.
 #[utoipa::path(
     get,
     path = "/users",
@@ -59,10 +60,11 @@ pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<CurrentUser>, 
 pub(super) async fn list(
     _: Authorized<Administer>,
     State(app): State<AppState>,
-    paging: Paging<UserId>,
+    paging: Paging<Reverse<UserId>>,
 ) -> Result<Json<Page<User>>, Refusal> {
-    let all = users::all(&mut *app.read().await?).await?;
-    Ok(Json(paging.cut(all, |one| one.id)?.map(User::from)))
+    let mut all = users::all(&mut *app.read().await?).await?;
+    all.reverse();
+    Ok(Json(paging.cut(all, |one| Reverse(one.id))?.map(User::from)))
 }
 
 /// Get a user
@@ -83,7 +85,7 @@ pub(super) async fn get(
     Ok(Json(users::get(&mut *app.read().await?, id).await?.into()))
 }
 
-/// Add a user
+/// Create a user
 #[utoipa::path(
     post,
     path = "/users",
@@ -122,7 +124,7 @@ pub(super) struct SignInLink {
     operation_id = "create_sign_in_link",
     tag = "access",
     params(("id" = UserId, Path, description = "Identifier of the user")),
-    responses((status = 200, description = "Link, shown once", body = SignInLink)),
+    responses((status = 201, description = "Link, shown once. `Location` is its user, because a link is a secret", body = SignInLink)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
@@ -133,7 +135,8 @@ pub(super) async fn link(
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
     let secret = user_administration::link(&mut writer, &request.actor, id).await?;
-    request.done(&app, writer, &SignInLink { path: format!("/sign-in/{secret}") }).await
+    let link = SignInLink { path: format!("/sign-in/{secret}") };
+    request.created(&app, writer, format!("/api/v1/users/{id}"), &link).await
 }
 
 /// Disable a user
@@ -182,7 +185,7 @@ pub(super) struct NewRole {
     role: Role,
 }
 
-/// Change the role of a user
+/// Set the role of a user
 ///
 /// If the user is no longer an administrator, the tokens that the user created are revoked.
 #[utoipa::path(

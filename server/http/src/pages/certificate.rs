@@ -10,7 +10,8 @@ use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, Difference, RECOVERY_STRIDES};
 use gait_optimizer::number_format::with_unit;
 use gaitwright_service::access::Run;
-use gaitwright_service::studies::certification;
+use gaitwright_service::job::JobState;
+use gaitwright_service::studies::certificate_request;
 use gaitwright_store::{TrialId, commit};
 
 /// A certificate as the page shows it.
@@ -91,17 +92,42 @@ impl FormattedCheck {
     }
 }
 
+/// The job that makes the certificate of a gait.
+pub(super) enum Certification {
+    /// There is none.
+    None,
+    /// It is queued or running.
+    Pending,
+    /// It was cancelled.
+    Cancelled,
+    /// It failed, for this reason.
+    Failed(String),
+}
+
+impl Certification {
+    pub(super) fn of(job: Option<(JobState, Option<String>)>) -> Self {
+        match job {
+            None | Some((JobState::Done, _)) => Self::None,
+            Some((JobState::Queued | JobState::Running, _)) => Self::Pending,
+            Some((JobState::Cancelled, _)) => Self::Cancelled,
+            Some((JobState::Failed, reason)) => Self::Failed(reason.unwrap_or_default()),
+        }
+    }
+
+    pub(super) fn is_pending(&self) -> bool {
+        matches!(self, Self::Pending)
+    }
+}
+
 /// `POST /trials/{id}/certify`.
 pub(super) async fn post(
     authorized: Authorized<Run>,
-    State(mut app): State<AppState>,
+    State(app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
 ) -> Result<Redirect, PageError> {
-    let begun =
-        certification::begin(&mut *app.read().await.map_err(gaitwright_service::error::Error::from)?, id).await?;
-    let certificate = certification::certificate(app.store_mut(), begun).await?;
     let mut writer = app.write().await?;
-    certification::record(&mut writer, &authorized.caller.actor, id, &certificate).await?;
+    certificate_request::ask(&mut writer, &app.scheduler, &authorized.caller.actor, id).await?;
     commit(writer).await?;
+    app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}#certificate")))
 }

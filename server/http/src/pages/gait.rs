@@ -1,6 +1,6 @@
 //! The page of a trial and its gait.
 
-use super::certificate;
+use super::certificate::{self, Certification};
 use super::explanation::{FeasibleRelaxation, NoGait};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
@@ -50,6 +50,8 @@ struct GaitPage {
     summary: Option<GaitSummary>,
     may_run: bool,
     certificate: Option<certificate::InWords>,
+    /// The job that makes the certificate.
+    certification: Certification,
     /// Simulated walks, for a converged gait.
     walks: Option<SimulatedWalks>,
     /// Whether the page offers the sensitivities of a converged gait, which take a second.
@@ -81,6 +83,11 @@ struct GaitPage {
 }
 
 impl GaitPage {
+    /// Whether the page shows a result that a job is computing.
+    fn follows_a_job(&self) -> bool {
+        self.certification.is_pending() || self.walks.as_ref().is_some_and(SimulatedWalks::is_pending)
+    }
+
     /// The safety reports in force of the page, for a review; `None` without one.
     fn reports(&self) -> Option<String> {
         let shown: Vec<String> = self.unsafe_by.iter().map(|report| report.id().to_string()).collect();
@@ -173,6 +180,7 @@ pub(super) async fn get(
         summary,
         may_run,
         certificate,
+        certification: Certification::of(app.scheduler.certifying(id)),
         walks,
         offers_sensitivities: converged && sensitivities.is_none(),
         sensitivities,

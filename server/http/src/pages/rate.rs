@@ -219,10 +219,10 @@ pub(super) async fn next(
     State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Rate>,
 ) -> Result<Redirect, PageError> {
-    let (writer, shown) = blind::next(app.store_mut(), &authorized.caller, id).await?;
+    let (writer, next) = blind::next(app.store_mut(), &authorized.caller, id).await?;
     commit(writer).await?;
-    Ok(match shown {
-        Some(shown) => Redirect::to(&format!("/rate/pair/{}", shown.pair.code)),
+    Ok(match next {
+        Some(next) => Redirect::to(&format!("/rate/pair/{}", next.shown.pair.code)),
         None => Redirect::to(&format!("/rate?nothing=true&study={id}")),
     })
 }

@@ -5,7 +5,6 @@ use crate::authorization::Authorized;
 use crate::format::{count, duration, words};
 use crate::page_error::{PageResult, page};
 use crate::readiness;
-use crate::workers::Workers;
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::{Administer, Caller, Read, RequiredRight};
@@ -18,6 +17,7 @@ use gaitwright_store::backup::in_record_folder;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::totals::{self, Totals};
 use gaitwright_store::{SCHEMA_VERSION, commit, jobs, trials};
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 #[derive(Template)]
@@ -28,7 +28,10 @@ struct SystemPage {
     version: &'static str,
     /// Version of the database schema.
     schema_version: i64,
-    workers: Workers,
+    /// Number of solves that can run in parallel.
+    parallel_solves: usize,
+    /// Number of running solves by worker.
+    running_by_worker: BTreeMap<String, u32>,
     /// The outcome of the backup that was just requested.
     backup: Option<BackupNotice>,
     /// Backups in the folder of the record, newest first: name and bytes.
@@ -133,7 +136,6 @@ pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): 
 }
 
 async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> PageResult {
-    let workers = Workers::read(app).await?;
     let mut reader = app.read().await?;
     let totals = totals::read(&mut reader).await?;
     let (queued, running) = jobs::depth(&mut reader).await?;
@@ -148,7 +150,8 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
         version: env!("CARGO_PKG_VERSION"),
         schema_version: SCHEMA_VERSION,
         copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
-        workers,
+        parallel_solves: app.scheduler.workers(),
+        running_by_worker: jobs::by_worker(&mut reader).await?,
         backup,
         queued,
         running,

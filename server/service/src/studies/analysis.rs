@@ -9,6 +9,7 @@ use gaitwright_store::StudyId;
 use gaitwright_store::feedback::{FeedbackRow, LogVersion};
 use gaitwright_store::safety_reviews::SafetyVersion;
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Above this number of answers a page cannot wait for the posterior: its computing time grows with the third power.
@@ -100,6 +101,8 @@ pub struct Analyses {
     // A safety report changes which gaits can be recommended.
     shown: StudyCache<(LogVersion, SafetyVersion), Analysis>,
     histories: Recent<UtilityHistory>,
+    /// Number of posteriors computed, those of histories not included.
+    computed: AtomicU64,
 }
 
 impl Analyses {
@@ -117,12 +120,18 @@ impl Analyses {
             learner
         });
         let posterior = self.posteriors.get_or(snapshot.study.id, snapshot.version, || {
+            self.computed.fetch_add(1, Ordering::Relaxed);
             learner.posterior(&plan.search_space, &snapshot.log(), &plan.learner)
         });
         if snapshot.trials.len() > MOST_KEPT_TRIALS {
             *learner = Learner::default();
         }
         posterior
+    }
+
+    /// Number of posteriors computed so far, without cached ones and those of histories.
+    pub fn computed(&self) -> u64 {
+        self.computed.load(Ordering::Relaxed)
     }
 
     /// The cached learner of a study, or a new one.

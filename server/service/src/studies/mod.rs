@@ -11,6 +11,7 @@ pub mod atlas;
 pub mod blind;
 pub mod bound_grid;
 pub mod built_in_entries;
+pub mod certificate_request;
 pub mod certification;
 pub mod certified_best;
 mod certifier;

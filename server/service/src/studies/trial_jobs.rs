@@ -161,8 +161,10 @@ impl<J: TrialJob> TrialJobs<J> {
         } else {
             tracing::warn!(job = J::NAME, %trial, %error, "a job failed");
             let reason = error.to_string();
-            self.queue().fail(trial, reason.clone());
-            self.job.record_failure(trial, &reason).await?;
+            // On record before the job counts as failed, because whoever sees the failure looks for its event.
+            let recorded = self.job.record_failure(trial, &reason).await;
+            self.queue().fail(trial, reason);
+            recorded?;
         }
         Ok(true)
     }

@@ -10,6 +10,9 @@ use std::collections::HashSet;
 
 /// Largest number of points: each one costs a fit of all answers before it.
 const MOST_POINTS: usize = 64;
+/// Largest number of entries with which all these fits together take well below a second. A longer log has fewer points in
+/// proportion, because a request waits for them.
+const MOST_ENTRIES_OF_ALL_POINTS: usize = 200;
 
 /// The recommended gait after a number of answers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,10 +70,7 @@ fn counts(row: &FeedbackRow) -> bool {
 /// last, so that earlier points stay as the log grows.
 fn prefixes(rows: &[&FeedbackRow]) -> Vec<(u32, usize)> {
     let answers: Vec<usize> = (0..rows.len()).filter(|place| is_answer_of_a_person(rows[*place])).collect();
-    let mut stride = 1;
-    while answers.len() / stride > MOST_POINTS {
-        stride *= 2;
-    }
+    let stride = stride(answers.len(), rows.len());
     let shown = (1..=answers.len()).filter(|count| count % stride == 0 || *count == answers.len());
     shown
         .filter_map(|count| {
@@ -78,6 +78,16 @@ fn prefixes(rows: &[&FeedbackRow]) -> Vec<(u32, usize)> {
             Some((u32::try_from(count).ok()?, used))
         })
         .collect()
+}
+
+/// Every how many answers there is a point.
+fn stride(answers: usize, entries: usize) -> usize {
+    let points = MOST_POINTS * MOST_ENTRIES_OF_ALL_POINTS / entries.max(MOST_ENTRIES_OF_ALL_POINTS);
+    let mut stride = 1;
+    while answers / stride > points {
+        stride *= 2;
+    }
+    stride
 }
 
 /// `None` if no gait could be recommended then.
@@ -124,4 +134,18 @@ fn highest<'a>(
         }
     }
     Ok(best.map(|(_, trial)| trial))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stride;
+
+    #[test]
+    fn longer_logs_have_fewer_points() {
+        for (answers, entries, points) in
+            [(60, 100, 60), (64, 200, 64), (65, 200, 32), (100, 400, 25), (1000, 1300, 7), (10_000, 10_400, 1)]
+        {
+            assert_eq!(answers / stride(answers, entries), points, "{answers} of {entries}");
+        }
+    }
 }

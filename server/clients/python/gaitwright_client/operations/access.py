@@ -78,7 +78,7 @@ class AccessMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[StudyRestriction],
     ) -> StudyRestriction:
-        """Restrict or open a study.
+        """Set the access restriction of a study.
 
         Restricts the study to members and administrators, or opens it to all staff. The caller who restricts it becomes
         a member.
@@ -96,8 +96,8 @@ class AccessMethods(Transport):
             ),
         )
 
-    def invite_rater(self, study_id: StudyId, **body: Unpack[RaterInvitation]) -> CreatedRaterInvitation:
-        """Invite a rater.
+    def create_invitation(self, study_id: StudyId, **body: Unpack[RaterInvitation]) -> CreatedRaterInvitation:
+        """Create an invitation of a rater.
 
         Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
 
@@ -119,18 +119,18 @@ class AccessMethods(Transport):
 
         Raters can access studies of which they are members. Clinicians, and tokens with any scope other than `rate`,
         can access every unrestricted study, and the restricted studies of which they are members. A request for any
-        other study is answered with 404.
+        other study is answered with 404. Oldest first.
         """
         return Pages(self, "/api/v1/studies/{id}/members", {"id": study_id}, query={"limit": page_size})
 
-    def add_study_member(
+    def create_study_member(
         self,
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewMember],
     ) -> Member:
-        """Add a member to a study.
+        """Create a study member.
 
         Assigns a rater, or adds a clinician or a token.
 
@@ -172,7 +172,7 @@ class AccessMethods(Transport):
     def list_tokens(self, *, page_size: Optional[int] = None) -> Pages[Token]:
         """List tokens.
 
-        Oldest first.
+        Newest first.
         """
         return Pages(self, "/api/v1/tokens", query={"limit": page_size})
 
@@ -207,12 +207,12 @@ class AccessMethods(Transport):
     def list_users(self, *, page_size: Optional[int] = None) -> Pages[User]:
         """List users.
 
-        Oldest first.
+        Newest first.
         """
         return Pages(self, "/api/v1/users", query={"limit": page_size})
 
     def create_user(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewUser]) -> User:
-        """Add a user.
+        """Create a user.
 
         Fields: name, role.
         """
@@ -241,7 +241,7 @@ class AccessMethods(Transport):
         return cast(SignInLink, self.request_json("POST", "/api/v1/users/{id}/link", {"id": user_id}, repeatable=False))
 
     def set_user_role(self, user_id: UserId, *, idempotency_key: Optional[str] = None, **body: Unpack[NewRole]) -> User:
-        """Change the role of a user.
+        """Set the role of a user.
 
         If the user is no longer an administrator, the tokens that the user created are revoked.
 

@@ -66,7 +66,7 @@ class BlindMethods(Transport):
         )
 
     def draw_blind_pair(self, study_id: StudyId, *, idempotency_key: Optional[str] = None) -> NextBlindPair:
-        """Get the next pair for a rater.
+        """Draw the next pair for a rater.
 
         Returns the same pair until it is answered.
         """
@@ -81,9 +81,10 @@ class BlindMethods(Transport):
         )
 
     def list_raters(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterReliability]:
-        """Get the reliability of raters.
+        """List raters with their reliability.
 
         Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
+        Sorted by name.
         """
         return Pages(self, "/api/v1/studies/{id}/raters", {"id": study_id}, query={"limit": page_size})
 

@@ -30,7 +30,7 @@ class DevicesMethods(Transport):
         return Pages(self, "/api/v1/devices", query={"limit": page_size})
 
     def create_device(self, *, idempotency_key: Optional[str] = None, **body: Unpack[DeviceDefinition]) -> Device:
-        """Add a device from a data file.
+        """Create a device from a data file.
 
         If a device with the same definition exists, the response contains it.
 

@@ -17,7 +17,7 @@ class HealthMethods(Transport):
     """Operations with the tag `health`."""
 
     def get_health(self) -> Health:
-        """Check that the service is healthy.
+        """Get the health of the service.
 
         Succeeds if the database responds. Requires no sign-in. It reveals nothing about solves, because a rater could
         infer the effect of an answer from them.

@@ -50,7 +50,7 @@ class LabMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewLabAnswer],
     ) -> LabSessionProgress:
-        """Record the answer of the subject.
+        """Answer a lab session.
 
         States which walk was better, that there is no difference, that the subject cannot tell, or that a walk was
         unsafe. The answer reaches the learner at unblinding; a safety report takes effect at once.
@@ -127,16 +127,17 @@ class LabMethods(Transport):
         """
         return cast(EmgView, self.request_json("GET", "/api/v1/lab-sessions/{id}/emg-results", {"id": lab_session_id}))
 
-    def process_emg(
+    def create_emg_result(
         self,
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[EmgProcessing],
     ) -> EmgView:
-        """Process EMG recordings.
+        """Create an EMG result.
 
-        Filters, segments and normalises the newest EMG recordings. Can be repeated with other settings.
+        Processes EMG recordings: filters, segments and normalises the newest EMG recordings. Can be repeated with other
+        settings.
 
         Fields: optionally settings.
         """
@@ -152,9 +153,9 @@ class LabMethods(Transport):
         )
 
     def list_limit_cycles(self, lab_session_id: LabSessionId, *, page_size: Optional[int] = None) -> Pages[LimitCycles]:
-        """Get limit cycles.
+        """List limit cycles.
 
-        Angle and velocity of every recorded joint, from the newest joint angles of each walk.
+        Angle and velocity of every recorded joint, from the newest joint angles of each walk. Sorted by walk.
         """
         return Pages(self, "/api/v1/lab-sessions/{id}/limit-cycles", {"id": lab_session_id}, query={"limit": page_size})
 
@@ -175,14 +176,14 @@ class LabMethods(Transport):
             query={"limit": page_size},
         )
 
-    def add_emg_file(
+    def create_emg_file(
         self,
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewEmg],
     ) -> MeasurementFile:
-        """Upload an EMG recording of a walk.
+        """Create a measurement file with EMG.
 
         An incomplete file, or one without a complete stride, is refused.
 
@@ -199,14 +200,14 @@ class LabMethods(Transport):
             ),
         )
 
-    def add_joint_angle_file(
+    def create_joint_angle_file(
         self,
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewJointAngles],
     ) -> MeasurementFile:
-        """Upload joint angles of a walk.
+        """Create a measurement file with joint angles.
 
         Limit cycles are computed from the file.
 
@@ -327,18 +328,18 @@ class LabMethods(Transport):
     def list_lab_sessions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[LabSessionView]:
         """List lab sessions of a study.
 
-        The response omits blinded data.
+        The response omits blinded data. Sorted by number.
         """
         return Pages(self, "/api/v1/studies/{id}/lab-sessions", {"id": study_id}, query={"limit": page_size})
 
-    def plan_lab_session(
+    def create_lab_session(
         self,
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewLabSession],
     ) -> LabSessionView:
-        """Plan a lab session.
+        """Create a lab session.
 
         The session consists of a walk without the device, then one with each gait. The order of the gaits is drawn at
         random when the session is planned, and concealed.

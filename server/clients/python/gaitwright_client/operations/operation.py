@@ -17,7 +17,7 @@ from ..schemas import (
     JobKind,
     StudyId,
     SubjectId,
-    Workers,
+    Worker,
 )
 from ..transport import Transport
 
@@ -51,8 +51,8 @@ class OperationMethods(Transport):
         """
         return Pages(self, "/api/v1/audit", query={"text": text, "limit": page_size})
 
-    def create_backup(self, *, idempotency_key: Optional[str] = None) -> Job:
-        """Back up the record.
+    def request_backup(self, *, idempotency_key: Optional[str] = None) -> Job:
+        """Request a backup.
 
         Writes a backup next to the database and verifies it. The backup is completed even if the caller disconnects.
         """
@@ -71,7 +71,7 @@ class OperationMethods(Transport):
     ) -> Pages[Job]:
         """List jobs.
 
-        Jobs that have not ended: backups, and those of studies that the caller can access.
+        Jobs that have not ended: backups, and those of studies that the caller can access. Sorted by kind and age.
 
         kind: Only jobs of this kind.
 
@@ -94,9 +94,9 @@ class OperationMethods(Transport):
         """
         return cast(Job, self.request_json("POST", "/api/v1/jobs/{id}/cancel", {"id": job_id}, key=idempotency_key))
 
-    def get_workers(self) -> Workers:
+    def list_workers(self, *, page_size: Optional[int] = None) -> Pages[Worker]:
         """List workers.
 
-        A remote worker is listed only while it runs a solve.
+        The workers that are running solves. Sorted by name.
         """
-        return cast(Workers, self.request_json("GET", "/api/v1/workers"))
+        return Pages(self, "/api/v1/workers", query={"limit": page_size})

@@ -104,7 +104,7 @@ class PreferencesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewAssessment],
     ) -> Assessment:
-        """Record an assessment of two gaits.
+        """Create an assessment of two gaits.
 
         States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
         recommended, compared or planned for lab sessions until staff have cleared the gait.
@@ -136,7 +136,7 @@ class PreferencesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewPreference],
     ) -> CreatedPreference:
-        """Record a preference.
+        """Create a preference.
 
         Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author can
         give only one answer per pair of gaits; to change an answer, retract it first.
@@ -166,7 +166,7 @@ class PreferencesMethods(Transport):
 
         Includes safety reports from raters, assessments and lab sessions, and reports about a single gait. A report
         stays in the list after its gait is cleared for walking. A report from a blinded lab session is listed for both
-        of its gaits.
+        of its gaits. Oldest first.
         """
         return Pages(self, "/api/v1/studies/{id}/safety-reports", {"id": study_id}, query={"limit": page_size})
 
@@ -184,7 +184,7 @@ class PreferencesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[Suggestion],
     ) -> Preference:
-        """Record a suggestion.
+        """Create a suggestion.
 
         The learner uses it like a preference. Retract it with `POST /api/v1/preferences/{id}/retract`.
 
@@ -208,7 +208,7 @@ class PreferencesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewSafetyReport],
     ) -> SafetyReport:
-        """Report a gait as unsafe.
+        """Create a safety report.
 
         Until staff have cleared the gait, neither the gait nor any other trial of the subject with the same motion is
         recommended, compared or used for walking. The report does not reach the learner.
@@ -233,7 +233,7 @@ class PreferencesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewSafetyReview],
     ) -> SafetyReview:
-        """Review the safety reports of a gait.
+        """Create a review of safety reports.
 
         If the gait is cleared, it can again be recommended, compared and used in lab sessions, and the preferences
         derived from the reports are retracted. If a lab session with a report about the gait is unblinded later, that

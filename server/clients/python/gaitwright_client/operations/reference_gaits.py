@@ -35,7 +35,7 @@ class ReferenceGaitsMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewReferenceGait],
     ) -> ReferenceGait:
-        """Import a reference gait from a recording.
+        """Create a reference gait from a recording.
 
         Segments the recording at right heel strikes and averages its strides. If the recording was already imported,
         the response contains the existing reference gait.

@@ -110,7 +110,7 @@ class StudiesMethods(Transport):
         )
 
     def get_study_archive(self, study_id: StudyId) -> bytes:
-        """Export a study as an archive.
+        """Download a study as an archive.
 
         The archive has every row of the study, without concealed allocations, as `gaitwright export` writes it.
         """
@@ -159,7 +159,7 @@ class StudiesMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[StudyExtension],
     ) -> StudyView:
-        """Raise the number of trials of a study.
+        """Extend a study.
 
         If the study has ended, it resumes.
 
@@ -178,9 +178,9 @@ class StudiesMethods(Transport):
         )
 
     def list_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Milestone]:
-        """Get the history of the recommendation.
+        """List the history of the recommendation.
 
-        The best trial after each iteration of the study, that is, after each result.
+        The best trial after each iteration of the study, that is, after each result. Sorted by iteration.
         """
         return Pages(self, "/api/v1/studies/{id}/history", {"id": study_id}, query={"limit": page_size})
 
@@ -194,7 +194,8 @@ class StudiesMethods(Transport):
     def list_study_imports(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Import]:
         """List the imports of a study.
 
-        One entry for each time the study was imported into a record. Empty if the study was created in this record.
+        One entry for each time the study was imported into a record, oldest first. Empty if the study was created in
+        this record.
         """
         return Pages(self, "/api/v1/studies/{id}/imports", {"id": study_id}, query={"limit": page_size})
 
@@ -316,10 +317,11 @@ class StudiesMethods(Transport):
             ),
         )
 
-    def list_study_comparisons(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
-        """Compare several studies.
+    def list_compared_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
+        """List compared studies.
 
-        Results keep the order of `ids`.
+        Properties and results of several studies. A page has at most 5 studies, because each needs a posterior. Sorted
+        as in `ids`.
 
         ids: 2 to 20 comma-separated identifiers of different studies.
         """

@@ -37,7 +37,7 @@ class SubjectsMethods(Transport):
         return Pages(self, "/api/v1/subjects", query={"limit": page_size})
 
     def create_subject(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewSubject]) -> Subject:
-        """Add a subject.
+        """Create a subject.
 
         Fields: body_mass_kg, height_m, pseudonym; optionally notes.
         """
@@ -54,14 +54,16 @@ class SubjectsMethods(Transport):
         """
         return Pages(self, "/api/v1/subjects/{id}/consents", {"id": subject_id}, query={"limit": page_size})
 
-    def record_consent(
+    def create_consent(
         self,
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewConsent],
     ) -> Consent:
-        """Record consent.
+        """Create a consent.
+
+        Records that the subject consented.
 
         Fields: form.
         """
@@ -83,16 +85,16 @@ class SubjectsMethods(Transport):
         """
         return Pages(self, "/api/v1/subjects/{id}/corrections", {"id": subject_id}, query={"limit": page_size})
 
-    def correct_subject(
+    def create_subject_correction(
         self,
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewCorrection],
     ) -> Correction:
-        """Correct the height and mass of a subject.
+        """Create a correction of a subject.
 
-        New studies use the corrected values. Existing studies keep theirs.
+        Corrects height and mass. New studies use the corrected values. Existing studies keep theirs.
 
         Fields: body_mass_kg, height_m, reason.
         """
@@ -144,9 +146,9 @@ class SubjectsMethods(Transport):
         *,
         page_size: Optional[int] = None,
     ) -> Pages[ReferenceGaitMatch]:
-        """Rank reference gaits for a subject.
+        """List the nearest reference gaits of a subject.
 
-        The nearest in height and body mass first. Those without height and mass come last.
+        Sorted by distance in height and body mass, the nearest first. Those without height and mass come last.
         """
         return Pages(self, "/api/v1/subjects/{id}/reference-gaits", {"id": subject_id}, query={"limit": page_size})
 

@@ -76,7 +76,7 @@ class TrialsMethods(Transport):
     def list_attempts(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[AttemptResult]:
         """List attempts at a trial.
 
-        Results delivered by workers, including results that arrived too late to count.
+        Results delivered by workers, including results that arrived too late to count. Sorted by attempt.
         """
         return Pages(self, "/api/v1/trials/{id}/attempts", {"id": trial_id}, query={"limit": page_size})
 
@@ -216,7 +216,7 @@ class TrialsMethods(Transport):
     def list_iterations(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[Iteration]:
         """List iterations of a solve.
 
-        The iterations of the running solve so far, or the recorded ones of a solve that has ended.
+        The iterations of the running solve so far, or the recorded ones of a solve that has ended. Sorted by iteration.
         """
         return Pages(self, "/api/v1/trials/{id}/iterations", {"id": trial_id}, query={"limit": page_size})
 
@@ -245,6 +245,6 @@ class TrialsMethods(Transport):
         """Get the sensitivities of a trial.
 
         How the results of a gait change, to first order, with each tuned bound. Computed on request from the stored
-        solution.
+        solution, for meshes of up to 80 intervals (`gait_settings.mesh`, in sum).
         """
         return cast(TrialSensitivities, self.request_json("GET", "/api/v1/trials/{id}/sensitivities", {"id": trial_id}))

@@ -70,6 +70,15 @@ async fn pending_trials(store: &mut Store, study: StudyId) -> Result<Option<(Tri
     Ok(found.trials())
 }
 
+/// A pair for a rater.
+#[derive(Debug)]
+pub struct HandedOut {
+    /// The pair.
+    pub shown: PairWithSides,
+    /// Whether it was drawn for this request; `false` if it still waits for its answer.
+    pub is_new: bool,
+}
+
 /// The pair for a rater: the open one, or a new one. `None` if no comparison is pending.
 ///
 /// # Errors
@@ -78,7 +87,7 @@ pub async fn next<'a>(
     store: &'a mut Store,
     caller: &Caller,
     study: StudyId,
-) -> Result<(BorrowedWriter<'a>, Option<PairWithSides>), Error> {
+) -> Result<(BorrowedWriter<'a>, Option<HandedOut>), Error> {
     let pending = pending_trials(store, study).await?;
     let mut writer = store.write().await?;
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
@@ -94,8 +103,8 @@ pub async fn next<'a>(
             && allocations::is_included(&mut writer, open.id).await?
         {
             note(&mut writer, caller, open, "blind_pair.show").await?;
-            let open = own_pair(&mut writer, caller, &open.code).await?;
-            return Ok((writer, Some(open)));
+            let shown = own_pair(&mut writer, caller, &open.code).await?;
+            return Ok((writer, Some(HandedOut { shown, is_new: false })));
         }
         cancel(&mut writer, open).await?;
     }
@@ -120,7 +129,7 @@ pub async fn next<'a>(
     allocations::of_pair(&mut writer, id, next.same_sides_as, RandomDraw::draw()?).await?;
     let shown = own_pair(&mut writer, caller, &code).await?;
     note(&mut writer, caller, &shown.pair, "blind_pair.draw").await?;
-    Ok((writer, Some(shown)))
+    Ok((writer, Some(HandedOut { shown, is_new: true })))
 }
 
 /// The trials of pairs whose gaits have a safety report in force.

@@ -158,7 +158,7 @@ impl Scheduler {
     }
 
     /// The state of the certificate of a gait in this process, and the reason if it failed.
-    pub(super) fn certifying(&self, trial: TrialId) -> Option<(JobState, Option<String>)> {
+    pub fn certifying(&self, trial: TrialId) -> Option<(JobState, Option<String>)> {
         self.0.after_solves.as_ref().and_then(|jobs| jobs.certifying(trial))
     }
 
