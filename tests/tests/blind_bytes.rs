@@ -160,7 +160,8 @@ fn check(what: &str, answer: &Answer, id: &str, code: &str, secrets: &BTreeSet<S
 
 /// What is left of an answer without what names the pair and what is drawn of it.
 fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, String)>) {
-    let mut text = answer.text.replace(pair["code"].as_str().unwrap(), "TOKEN");
+    let code = pair["code"].as_str().unwrap();
+    let mut text = answer.text.replace(code, "TOKEN");
     if let Some((before, rest)) = text.clone().split_once("<noscript data-strips>") {
         text = format!("{before}{}", rest.split_once("</noscript>").unwrap().1);
     }
@@ -172,7 +173,8 @@ fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, St
     for (before, after) in [("Pair ", ""), ("\"number\":", ""), ("answer ", ":")] {
         text = text.replace(&format!("{before}{number}{after}"), &format!("{before}N{after}"));
     }
-    (answer.status, text, named(&answer.headers))
+    let headers = named(&answer.headers).into_iter().map(|(name, value)| (name, value.replace(code, "TOKEN")));
+    (answer.status, text, headers.collect())
 }
 
 /// Headers but the length of the body, which follows from the motion, and the identifier of the request.

@@ -98,7 +98,7 @@ async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     assert!(service.fetch(&format!("{api}/next-walk")).await.json()["walk"].is_null());
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 6).await.unwrap();
     let acts: Vec<_> = trail.iter().map(|row| row.change.trim_start_matches("lab_session.")).collect();
-    assert_eq!(acts, ["close", "walk", "unblind", "walk", "walk", "plan"]);
+    assert_eq!(acts, ["close", "record_walk", "unblind", "record_walk", "record_walk", "plan"]);
     service.stop().await;
 }
 

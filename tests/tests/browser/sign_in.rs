@@ -84,7 +84,7 @@ async fn browser_administrator_adds_a_rater_and_a_token_and_reads_the_audit_trai
     page.goto(&site.at("/audit?verify=true")).await;
     page.wait_for(".notice.good").await;
     let rows = page.text("tbody").await;
-    assert!(["token: make", "user: add", "backup: complete"].iter().all(|row| rows.contains(row)), "{rows}");
+    assert!(["token: create", "user: add", "backup: complete"].iter().all(|row| rows.contains(row)), "{rows}");
     // The rater sees comparisons and nothing else.
     page.goto(&link).await;
     page.click("main button").await;
