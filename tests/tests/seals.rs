@@ -125,7 +125,7 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
         (_, column) if column == last && ["feedback_seq", "number"].contains(&last) => format!("{column} + 1000"),
         ("lab_session_steps", "step") => "'closed'".to_owned(),
         ("blind_pairs" | "trials" | "lab_sessions", "number") => format!("{column} + 1000"),
-        (_, "hash" | "token") => "hex(randomblob(32))".to_owned(),
+        (_, "hash" | "code") => "hex(randomblob(32))".to_owned(),
         ("feedback", "kind") => "'no_difference'".to_owned(),
         (_, "id" | "sha256" | "pseudonym" | "name") | ("jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
         (_, column) if column == last => "hex(randomblob(8))".to_owned(),
