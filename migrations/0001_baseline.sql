@@ -118,12 +118,12 @@ create table studies (
     base_bounds          text not null constraint studies_base_bounds_json check (json_valid(base_bounds)),
     search_space         text not null constraint studies_search_space_json check (json_valid(search_space)),
     learner              text not null constraint studies_learner_json check (json_valid(learner)),
-    feedback_mode        text not null
-                         constraint studies_feedback_mode check (feedback_mode in ('automatic', 'human', 'mixed')),
+    answer_source        text not null
+                         constraint studies_answer_source check (answer_source in ('gait_rmse', 'people', 'both')),
     -- What evaluates trials.
     evaluation           text not null default 'optimizer'
                          constraint studies_evaluation check (evaluation in ('optimizer', 'script')),
-    trial_budget         integer not null constraint studies_trial_budget check (trial_budget between 1 and 10000),
+    number_of_trials     integer not null constraint studies_number_of_trials check (number_of_trials between 1 and 10000),
     -- Total solve time after which no new trial starts.
     solve_seconds_budget real
                          constraint studies_solve_seconds
@@ -286,8 +286,8 @@ create table trials (
     started_at        text,
     finished_at       text,
     constraint trials_number_unique unique (study_id, number),
-    constraint trials_converged_has_figures check (
-        -- A script can report a converged trial without the figures of a solve.
+    constraint trials_converged_has_values check (
+        -- A script can report a converged trial without the values of a solve.
         state <> 'converged' or script is not null
         or (gait_rmse_rad is not null and cost_of_transport is not null and report is not null)
     ),
@@ -347,7 +347,7 @@ create table attempts (
     used        integer not null constraint attempts_used check (used in (0, 1)),
     -- How the solve ended.
     status      text not null,
-    -- The finite figures of the solve.
+    -- The finite values of the solve.
     report      text constraint attempts_report_json check (report is null or json_valid(report)),
     received_at text not null,
     constraint attempts_once primary key (trial_id, attempt)
@@ -436,10 +436,10 @@ create table feedback (
     seq        integer primary key autoincrement,
     id         text not null constraint feedback_id_unique unique,
     study_id   text not null references studies (id),
-    kind       text not null constraint feedback_kind check (kind in ('label', 'preference', 'tie', 'suggestion')),
-    -- label: the trial. preference: the winner. tie: one of the two trials. suggestion: the trial that it improves.
+    kind       text not null constraint feedback_kind check (kind in ('label', 'preference', 'no_difference', 'suggestion')),
+    -- label: the trial. preference: the winner. no_difference: one of the two trials. suggestion: the trial that it improves.
     trial_a    text not null references trials (id),
-    -- preference: the loser. tie: the other trial.
+    -- preference: the loser. no_difference: the other trial.
     trial_b    text references trials (id),
     -- label: the ordinal category; 0 is not converged.
     category   integer,
@@ -482,16 +482,16 @@ when (select subject_id from studies where id = new.study_id) in (select subject
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- A retracted answer stays in the record.
-create table retractions (
+create table feedback_retractions (
     feedback_seq integer primary key not null references feedback (seq),
-    author       text not null constraint retractions_author_length check (length(author) between 1 and 80),
-    reason       text not null constraint retractions_reason_length check (length(reason) between 1 and 2000),
+    author       text not null constraint feedback_retractions_author_length check (length(author) between 1 and 80),
+    reason       text not null constraint feedback_retractions_reason_length check (length(reason) between 1 and 2000),
     created_at   text not null
 ) strict;
 
-create trigger retractions_no_update before update on retractions
+create trigger feedback_retractions_no_update before update on feedback_retractions
 begin select raise(abort, 'retractions are append-only'); end;
-create trigger retractions_no_delete before delete on retractions
+create trigger feedback_retractions_no_delete before delete on feedback_retractions
 begin select raise(abort, 'retractions are append-only'); end;
 
 -- Answers about two gaits that state no preference. Those of raters are in blind_pair_answers, those of subjects in
@@ -598,13 +598,13 @@ begin select raise(abort, 'safety reviews are append-only'); end;
 
 ---------------------------------------------------------------- Blind pairs
 
--- Pairs of gaits shown to raters. A rater knows a pair by its token only. Gait A is the newer one, so trial_a and trial_b do
+-- Pairs of gaits shown to raters. A rater knows a pair by its code only. Gait A is the newer one, so trial_a and trial_b do
 -- not tell which gait is shown first: that is an allocation (blind_pair_allocations).
 create table blind_pairs (
     id         text primary key not null,
-    token      text not null
-               constraint blind_pairs_token_unique unique
-               constraint blind_pairs_token_length check (length(token) = 64),
+    code       text not null
+               constraint blind_pairs_code_unique unique
+               constraint blind_pairs_code_length check (length(code) = 64),
     study_id   text not null references studies (id),
     rater      text not null constraint blind_pairs_rater_length check (length(rater) between 1 and 80),
     -- Number for this rater in this study.
@@ -686,18 +686,18 @@ create trigger blind_pair_allocations_no_delete before delete on blind_pair_allo
 begin select raise(abort, 'allocations are append-only'); end;
 
 -- Raters who were unblinded in a study.
-create table unblindings (
+create table rater_unblindings (
     seq        integer primary key autoincrement,
     study_id   text not null references studies (id),
     rater      text not null,
     actor      text not null,
-    reason     text not null constraint unblindings_reason_length check (length(reason) between 1 and 2000),
+    reason     text not null constraint rater_unblindings_reason_length check (length(reason) between 1 and 2000),
     created_at text not null
 ) strict;
 
-create trigger unblindings_no_update before update on unblindings
+create trigger rater_unblindings_no_update before update on rater_unblindings
 begin select raise(abort, 'unblindings are append-only'); end;
-create trigger unblindings_no_delete before delete on unblindings
+create trigger rater_unblindings_no_delete before delete on rater_unblindings
 begin select raise(abort, 'unblindings are append-only'); end;
 
 ---------------------------------------------------------------- Lab sessions
@@ -730,12 +730,12 @@ begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Which gait walk 2 uses, drawn by the operating system. Only store/src/allocations reads this table.
 create table lab_allocations (
-    session_id   text primary key not null references lab_sessions (id),
+    lab_session_id text primary key not null references lab_sessions (id),
     -- Whether walk 2 uses gait A.
-    gait_a_first integer not null constraint lab_allocations_order check (gait_a_first in (0, 1)),
+    gait_a_first   integer not null constraint lab_allocations_order check (gait_a_first in (0, 1)),
     -- Random, so that the hash in the seal of the row does not reveal the allocation.
-    nonce        text not null constraint lab_allocations_nonce check (length(nonce) = 64),
-    created_at   text not null
+    nonce          text not null constraint lab_allocations_nonce check (length(nonce) = 64),
+    created_at     text not null
 ) strict;
 
 create trigger lab_allocations_no_update before update on lab_allocations
@@ -745,14 +745,14 @@ begin select raise(abort, 'allocations are append-only'); end;
 
 -- Completed steps of a session. Each step happens at most once.
 create table lab_session_steps (
-    session_id text not null references lab_sessions (id),
-    step       text not null
-               constraint lab_session_steps_step
-               check (step in ('walk_1', 'walk_2', 'walk_3', 'unblinded', 'closed')),
-    note       text not null default '' constraint lab_session_steps_note check (length(note) <= 2000),
-    actor      text not null,
-    created_at text not null,
-    primary key (session_id, step)
+    lab_session_id text not null references lab_sessions (id),
+    step           text not null
+                   constraint lab_session_steps_step
+                   check (step in ('walk_1', 'walk_2', 'walk_3', 'unblinded', 'closed')),
+    note           text not null default '' constraint lab_session_steps_note check (length(note) <= 2000),
+    actor          text not null,
+    created_at     text not null,
+    primary key (lab_session_id, step)
 ) strict;
 
 create trigger lab_session_steps_no_update before update on lab_session_steps
@@ -760,46 +760,46 @@ begin select raise(abort, 'steps of lab sessions are append-only'); end;
 create trigger lab_session_steps_no_delete before delete on lab_session_steps
 begin select raise(abort, 'steps of lab sessions are append-only'); end;
 create trigger lab_session_steps_need_consent before insert on lab_session_steps
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Downloads of the controller files of walks. A controller file reveals the gait of its walk to a person who reads it.
 create table controller_file_downloads (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    walk       integer not null constraint controller_file_downloads_walk check (walk in (2, 3)),
+    id             text primary key not null,
+    lab_session_id text not null references lab_sessions (id),
+    walk           integer not null constraint controller_file_downloads_walk check (walk in (2, 3)),
     -- Whether the device itself fetched the file, with a token that has no other right.
-    to_device  integer not null constraint controller_file_downloads_to_device check (to_device in (0, 1)),
-    actor      text not null,
-    created_at text not null
+    to_device      integer not null constraint controller_file_downloads_to_device check (to_device in (0, 1)),
+    actor          text not null,
+    created_at     text not null
 ) strict;
 
-create index controller_file_downloads_by_session on controller_file_downloads (session_id);
+create index controller_file_downloads_by_session on controller_file_downloads (lab_session_id);
 
 create trigger controller_file_downloads_no_update before update on controller_file_downloads
 begin select raise(abort, 'downloads of controller files are append-only'); end;
 create trigger controller_file_downloads_no_delete before delete on controller_file_downloads
 begin select raise(abort, 'downloads of controller files are append-only'); end;
 create trigger controller_file_downloads_need_consent before insert on controller_file_downloads
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Answers of the subject about the two walks with the device: first is walk 2. The learner receives a preference only when the
 -- session is unblinded, because feedback is visible and would reveal the allocation.
 create table lab_answers (
-    session_id text not null references lab_sessions (id),
+    lab_session_id text not null references lab_sessions (id),
     -- From 1; an answer after a retraction has the next number.
-    number     integer not null constraint lab_answers_number check (number >= 1),
-    answer     text not null
-               constraint lab_answers_answer
-               check (answer in ('first', 'second', 'no_difference', 'cannot_tell', 'unsafe_first', 'unsafe_second',
-                                 'unsafe_both')),
-    note       text not null default '' constraint lab_answers_note check (length(note) <= 2000),
-    actor      text not null,
-    created_at text not null,
-    primary key (session_id, number)
+    number         integer not null constraint lab_answers_number check (number >= 1),
+    answer         text not null
+                   constraint lab_answers_answer
+                   check (answer in ('first', 'second', 'no_difference', 'cannot_tell', 'unsafe_first', 'unsafe_second',
+                                     'unsafe_both')),
+    note           text not null default '' constraint lab_answers_note check (length(note) <= 2000),
+    actor          text not null,
+    created_at     text not null,
+    primary key (lab_session_id, number)
 ) strict;
 
 create trigger lab_answers_no_update before update on lab_answers
@@ -807,17 +807,17 @@ begin select raise(abort, 'answers in lab sessions are append-only'); end;
 create trigger lab_answers_no_delete before delete on lab_answers
 begin select raise(abort, 'answers in lab sessions are append-only'); end;
 create trigger lab_answers_need_consent before insert on lab_answers
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 create table lab_answer_retractions (
-    session_id text not null,
-    number     integer not null,
-    actor      text not null,
-    created_at text not null,
-    primary key (session_id, number),
-    foreign key (session_id, number) references lab_answers (session_id, number)
+    lab_session_id text not null,
+    number         integer not null,
+    actor          text not null,
+    created_at     text not null,
+    primary key (lab_session_id, number),
+    foreign key (lab_session_id, number) references lab_answers (lab_session_id, number)
 ) strict;
 
 create trigger lab_answer_retractions_no_update before update on lab_answer_retractions
@@ -828,47 +828,47 @@ begin select raise(abort, 'retractions are append-only'); end;
 -- Measurement files of walks. The newest file of a walk and kind is used. All of them are kept, so that they can be processed
 -- again with other settings.
 create table measurement_files (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    walk       integer not null constraint measurement_files_walk check (walk in (1, 2, 3)),
-    kind       text not null constraint measurement_files_kind check (kind in ('emg', 'motion')),
+    id             text primary key not null,
+    lab_session_id text not null references lab_sessions (id),
+    walk           integer not null constraint measurement_files_walk check (walk in (1, 2, 3)),
+    kind           text not null constraint measurement_files_kind check (kind in ('emg', 'joint_angles')),
     -- How to read the file, as JSON.
-    reading    text not null constraint measurement_files_reading check (json_valid(reading)),
+    reading        text not null constraint measurement_files_reading check (json_valid(reading)),
     -- The file, compressed with zstd.
-    raw        blob not null,
-    raw_sha256 text not null,
-    actor      text not null,
-    created_at text not null
+    raw            blob not null,
+    raw_sha256     text not null,
+    actor          text not null,
+    created_at     text not null
 ) strict;
 
-create index measurement_files_by_session on measurement_files (session_id, kind, walk);
+create index measurement_files_by_session on measurement_files (lab_session_id, kind, walk);
 
 create trigger measurement_files_no_update before update on measurement_files
 begin select raise(abort, 'measurement files are append-only'); end;
 create trigger measurement_files_no_delete before delete on measurement_files
 begin select raise(abort, 'measurement files are append-only'); end;
 create trigger measurement_files_need_consent before insert on measurement_files
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
 -- Results of EMG processing: settings and curves as JSON.
 create table emg_results (
-    id         text primary key not null,
-    session_id text not null references lab_sessions (id),
-    document   text not null constraint emg_results_document check (json_valid(document)),
-    actor      text not null,
-    created_at text not null
+    id             text primary key not null,
+    lab_session_id text not null references lab_sessions (id),
+    document       text not null constraint emg_results_document check (json_valid(document)),
+    actor          text not null,
+    created_at     text not null
 ) strict;
 
-create index emg_results_by_session on emg_results (session_id);
+create index emg_results_by_session on emg_results (lab_session_id);
 
 create trigger emg_results_no_update before update on emg_results
 begin select raise(abort, 'EMG results are append-only'); end;
 create trigger emg_results_no_delete before delete on emg_results
 begin select raise(abort, 'EMG results are append-only'); end;
 create trigger emg_results_need_consent before insert on emg_results
-when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.session_id)
+when (select s.subject_id from lab_sessions l join studies s on s.id = l.study_id where l.id = new.lab_session_id)
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
@@ -1010,20 +1010,20 @@ create table idempotency_keys (
 
 -- One row for each change by a user or a program, written in the transaction of the change.
 create table audit (
-    seq      integer primary key autoincrement,
-    at       text not null,
-    actor    text not null constraint audit_actor_length check (length(actor) between 1 and 120),
-    action   text not null constraint audit_action_length check (length(action) between 1 and 60),
+    seq        integer primary key autoincrement,
+    created_at text not null,
+    actor      text not null constraint audit_actor_length check (length(actor) between 1 and 120),
+    change     text not null constraint audit_change_length check (length(change) between 1 and 60),
     -- Kind and identifier of the changed object: `study 0190...`.
-    object   text not null,
-    detail   text not null constraint audit_detail_json check (json_valid(detail)),
+    object     text not null,
+    detail     text not null constraint audit_detail_json check (json_valid(detail)),
     -- The hash of the previous row, and the SHA-256 of this row together with it.
-    previous text not null constraint audit_previous_length check (length(previous) = 64),
-    hash     text not null constraint audit_hash_unique unique constraint audit_hash_length check (length(hash) = 64)
+    previous   text not null constraint audit_previous_length check (length(previous) = 64),
+    hash       text not null constraint audit_hash_unique unique constraint audit_hash_length check (length(hash) = 64)
 ) strict;
 
 -- Raters who were allowed to read earlier are not blind, so each of their answers looks up their former roles.
-create index audit_role_changes on audit (object) where action = 'user.role';
+create index audit_role_changes on audit (object) where change = 'user.role';
 
 create trigger audit_no_update before update on audit
 begin select raise(abort, 'the audit trail is append-only'); end;

@@ -61,6 +61,6 @@ fn eubo_cold(bencher: Bencher, comparisons: usize) {
 fn study_page(bencher: Bencher, comparisons: usize) {
     let space = space();
     let log = study(&space, comparisons);
-    let belief = gait_learner::posterior(&space, &log, &LearnerSettings::default()).expect("valid");
-    bencher.bench_local(|| page(&belief));
+    let posterior = gait_learner::posterior(&space, &log, &LearnerSettings::default()).expect("valid");
+    bencher.bench_local(|| page(&posterior));
 }

@@ -85,8 +85,8 @@ fn main() {
         for comparisons in [50, 200].into_iter().filter(|&count| only.is_none_or(|only| only == count)) {
             let log = study(&space, comparisons);
             for (name, method) in [("page, linecospar", Method::LineCoSpar), ("page, eubo", Method::Eubo)] {
-                let belief = gait_learner::posterior(&space, &log, &LearnerSettings::of(method)).expect("valid");
-                measure(name, comparisons, || (), |()| page(&belief));
+                let posterior = gait_learner::posterior(&space, &log, &LearnerSettings::of(method)).expect("valid");
+                measure(name, comparisons, || (), |()| page(&posterior));
             }
         }
     }

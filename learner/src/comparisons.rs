@@ -22,10 +22,10 @@ pub enum ComparisonReason {
     Consistency,
 }
 
-/// The question "Which of these two actions is better?".
+/// A comparison to ask for: which of two actions is better?
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProposedComparison {
-    /// The action in question.
+    /// The action in comparison.
     pub action: ActionIndex,
     /// The action that it is compared with.
     pub against: ActionIndex,
@@ -41,22 +41,22 @@ pub struct ProposedComparison {
 ///
 /// # Errors
 /// If a setting is out of range, or the log or `action` does not fit the space.
-pub fn comparisons_to_ask(
+pub fn proposed_comparisons(
     space: &SearchSpace,
     log: &FeedbackLog,
     action: ActionIndex,
     settings: &LearnerSettings,
 ) -> Result<Vec<ProposedComparison>> {
-    Learner::default().comparisons_to_ask(space, log, action, settings)
+    Learner::default().proposed_comparisons(space, log, action, settings)
 }
 
-/// [`comparisons_to_ask`] if only some actions are comparable, for example those with a gait to show.
+/// [`proposed_comparisons`] if only some actions are comparable, for example those with a gait to show.
 ///
 /// The other actions still count as members of their batches. Buffer and best action consist of comparable ones.
 ///
 /// # Errors
-/// As [`comparisons_to_ask`].
-pub fn comparisons_to_ask_among(
+/// As [`proposed_comparisons`].
+pub fn proposed_comparisons_among(
     space: &SearchSpace,
     log: &FeedbackLog,
     action: ActionIndex,
@@ -73,18 +73,18 @@ const ANSWERS_PER_REPEAT: usize = 8;
 /// The next comparison to ask about visited actions, if any is worth asking.
 ///
 /// An action whose last label is the lowest category is not comparable, because it did not converge. Unanswered
-/// comparisons of the last comparable action come first: with its partners of [`comparisons_to_ask`], with the action
+/// comparisons of the last comparable action come first: with its partners of [`proposed_comparisons`], with the action
 /// before it, and with the best action. After these, one comparison per eight answers is a repetition: the oldest pair
 /// that was answered once. Repetitions measure the consistency of the answers.
 ///
 /// # Errors
 /// If a setting is out of range or the log does not fit the space.
-pub fn what_to_ask(
+pub fn proposed_comparison(
     space: &SearchSpace,
     log: &FeedbackLog,
     settings: &LearnerSettings,
 ) -> Result<Option<ProposedComparison>> {
-    Learner::default().what_to_ask(space, log, settings)
+    Learner::default().proposed_comparison(space, log, settings)
 }
 
 /// The rule for the partners of an action.
@@ -105,11 +105,11 @@ impl<'a> Partners<'a> {
 }
 
 impl Learner {
-    /// [`comparisons_to_ask`] with the cache.
+    /// [`proposed_comparisons`] with the cache.
     ///
     /// # Errors
-    /// As [`comparisons_to_ask`].
-    pub fn comparisons_to_ask(
+    /// As [`proposed_comparisons`].
+    pub fn proposed_comparisons(
         &mut self,
         space: &SearchSpace,
         log: &FeedbackLog,
@@ -133,7 +133,7 @@ impl Learner {
         log.validate(space, settings.categories())?;
         let tried = log.visited.len();
         let end = match log.visited.iter().rposition(|&a| a == action) {
-            // With repeats, only the newest trial can be the one in question.
+            // With repeats, only the newest trial can be the one in comparison.
             Some(position) if !settings.repeats || position + 1 == tried => position,
             _ => tried,
         };
@@ -166,11 +166,11 @@ impl Learner {
         Ok(comparisons)
     }
 
-    /// [`what_to_ask`] with the cache.
+    /// [`proposed_comparison`] with the cache.
     ///
     /// # Errors
-    /// As [`what_to_ask`].
-    pub fn what_to_ask(
+    /// As [`proposed_comparison`].
+    pub fn proposed_comparison(
         &mut self,
         space: &SearchSpace,
         log: &FeedbackLog,
@@ -185,7 +185,7 @@ impl Learner {
             .iter()
             .filter_map(|feedback| match *feedback {
                 Feedback::Preference { winner, loser } => Some(pair(winner, loser)),
-                Feedback::Tie { a, b } => Some(pair(a, b)),
+                Feedback::NoDifference { a, b } => Some(pair(a, b)),
                 Feedback::Label { .. } | Feedback::Suggestion { .. } => None,
             })
             .collect();
@@ -219,16 +219,20 @@ mod tests {
         let space = SearchSpace::new(vec![dimension]).unwrap();
         let settings = LearnerSettings::default();
         let mut log = FeedbackLog { visited: vec![ActionIndex(3)], feedback: vec![] };
-        assert_eq!(what_to_ask(&space, &log, &settings).unwrap(), None);
+        assert_eq!(proposed_comparison(&space, &log, &settings).unwrap(), None);
         let mut reasons = Vec::new();
         let mut learner = Learner::default();
         for action in [9, 5, 12, 7, 20].map(ActionIndex) {
             log.visited.push(action);
-            while let Some(question) = what_to_ask(&space, &log, &settings).unwrap() {
-                assert_eq!(learner.what_to_ask(&space, &log, &settings).unwrap(), Some(question), "with the cache");
-                reasons.push(question.reason);
+            while let Some(comparison) = proposed_comparison(&space, &log, &settings).unwrap() {
+                assert_eq!(
+                    learner.proposed_comparison(&space, &log, &settings).unwrap(),
+                    Some(comparison),
+                    "with the cache"
+                );
+                reasons.push(comparison.reason);
                 assert!(reasons.len() < 30, "the comparisons do not end");
-                let (a, b) = (question.action, question.against);
+                let (a, b) = (comparison.action, comparison.against);
                 let closer = a.0.abs_diff(8) < b.0.abs_diff(8);
                 let (winner, loser) = if closer { (a, b) } else { (b, a) };
                 log.feedback.push(Feedback::Preference { winner, loser });
@@ -252,9 +256,10 @@ mod tests {
                 for action in [3, 4, 6, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18].map(ActionIndex) {
                     log.visited.push(action);
                     log.feedback.push(Feedback::Label { action, category: usize::from(!fails(action)) });
-                    while let Some(question) = what_to_ask(&space, &log, &settings).unwrap() {
-                        assert!(!fails(question.action) && !fails(question.against), "{question:?}");
-                        log.feedback.push(Feedback::Preference { winner: question.action, loser: question.against });
+                    while let Some(comparison) = proposed_comparison(&space, &log, &settings).unwrap() {
+                        assert!(!fails(comparison.action) && !fails(comparison.against), "{comparison:?}");
+                        log.feedback
+                            .push(Feedback::Preference { winner: comparison.action, loser: comparison.against });
                         asked += 1;
                         assert!(asked < 100, "the comparisons do not end");
                     }
@@ -267,10 +272,10 @@ mod tests {
         let labels = [0, 1].map(|category| Feedback::Label { action: a, category });
         let log = FeedbackLog { visited: vec![a, b], feedback: labels.to_vec() };
         let settings = LearnerSettings::default();
-        let question = what_to_ask(&space, &log, &settings).unwrap().unwrap();
-        assert_eq!((question.action, question.against), (b, a));
+        let comparison = proposed_comparison(&space, &log, &settings).unwrap().unwrap();
+        assert_eq!((comparison.action, comparison.against), (b, a));
         let corrected = FeedbackLog { feedback: labels.into_iter().rev().collect(), ..log };
-        assert_eq!(what_to_ask(&space, &corrected, &settings).unwrap(), None);
+        assert_eq!(proposed_comparison(&space, &corrected, &settings).unwrap(), None);
     }
 
     #[test]
@@ -284,8 +289,8 @@ mod tests {
         let log = FeedbackLog { visited: (0..8).map(ActionIndex).collect(), feedback: Vec::new() };
         let comparable = |action: ActionIndex| ![1, 4, 5].contains(&action.0);
         let against = |action: u64| -> Vec<u64> {
-            let asked = comparisons_to_ask_among(&space, &log, ActionIndex(action), &settings, comparable).unwrap();
-            asked.iter().map(|question| question.against.0).collect()
+            let asked = proposed_comparisons_among(&space, &log, ActionIndex(action), &settings, comparable).unwrap();
+            asked.iter().map(|comparison| comparison.against.0).collect()
         };
         assert_eq!(against(2), [0]);
         assert_eq!(against(3), [2, 0]);
@@ -304,10 +309,10 @@ mod tests {
             let mut asked = Vec::new();
             for (end, &action) in tried.iter().enumerate() {
                 let log = FeedbackLog { visited: tried[..end].to_vec(), feedback: Vec::new() };
-                let comparisons = comparisons_to_ask(&space, &log, action, &settings).unwrap();
+                let comparisons = proposed_comparisons(&space, &log, action, &settings).unwrap();
                 // The log may already have the trial.
                 let after = FeedbackLog { visited: tried[..=end].to_vec(), feedback: Vec::new() };
-                assert_eq!(comparisons_to_ask(&space, &after, action, &settings).unwrap(), comparisons);
+                assert_eq!(proposed_comparisons(&space, &after, action, &settings).unwrap(), comparisons);
                 asked.extend(comparisons.iter().map(|q| (q.against, q.action)));
             }
             let mut expected = Vec::new();

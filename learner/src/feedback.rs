@@ -28,7 +28,7 @@ pub enum Feedback {
         loser: ActionIndex,
     },
     /// Two actions feel the same.
-    Tie {
+    NoDifference {
         /// One action.
         a: ActionIndex,
         /// The other.
@@ -49,7 +49,7 @@ impl Feedback {
         match *self {
             Self::Label { action, .. } => (action, None),
             Self::Preference { winner, loser } => (winner, Some(loser)),
-            Self::Tie { a, b } => (a, Some(b)),
+            Self::NoDifference { a, b } => (a, Some(b)),
             Self::Suggestion { suggested, over } => (suggested, Some(over)),
         }
     }

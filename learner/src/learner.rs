@@ -1,17 +1,14 @@
 //! The learner: the posterior given a log, and a cache for calls with the same feedback.
 
-use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::action::ActionIndex;
 use crate::error::Result;
-use crate::feedback::{Feedback, FeedbackLog};
+use crate::feedback::FeedbackLog;
 use crate::fit::{LastFit, ProcessModel};
 use crate::gaussian_process::GaussianProcess;
 use crate::inference::{Approximate, ExpectationPropagation, Laplace};
 use crate::kernel::Kernel;
-use crate::likelihood::Interval;
-use crate::observations::Observation;
+use crate::observed_feedback::observations;
 use crate::posterior::Posterior;
 use crate::search_space::SearchSpace;
 use crate::settings::{Inference, Labels, LearnerSettings};
@@ -32,39 +29,6 @@ pub struct Learner {
 /// If a setting is out of range or the log does not fit the space.
 pub fn posterior(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) -> Result<Posterior> {
     Learner::default().posterior(space, log, settings)
-}
-
-/// The observations in the feedback: those of the utility, and with separate labels those of feasibility.
-fn observations(
-    log: &FeedbackLog,
-    settings: &LearnerSettings,
-    infeasible: &HashSet<ActionIndex>,
-) -> [Vec<Observation>; 2] {
-    let above = |noise| Interval { low: 0.0, high: f64::INFINITY, noise };
-    let mut split = [Vec::new(), Vec::new()];
-    for &feedback in &log.feedback {
-        let (plus, minus) = feedback.actions();
-        let interval = match feedback {
-            Feedback::Label { category, .. } if settings.labels == Labels::Separate => {
-                split[1].push(Observation { plus, minus, interval: settings.feasibility_interval(category) });
-                let grade = settings.grade_interval(category);
-                split[0].extend(grade.map(|interval| Observation { plus, minus, interval }));
-                continue;
-            }
-            Feedback::Label { category, .. } => settings.label_interval(category),
-            Feedback::Preference { .. } => above(settings.preference_noise),
-            Feedback::Suggestion { .. } => above(settings.coactive_noise),
-            Feedback::Tie { .. } => {
-                Interval { low: -settings.tie_width, high: settings.tie_width, noise: settings.tie_noise }
-            }
-        };
-        let decided = settings.labels == Labels::Separate
-            && minus.is_some_and(|minus| infeasible.contains(&plus) != infeasible.contains(&minus));
-        if !decided {
-            split[0].push(Observation { plus, minus, interval });
-        }
-    }
-    split
 }
 
 /// The prior of utility and feasibility.

@@ -1,9 +1,9 @@
 //! Preference-based Bayesian optimisation over a finite grid of actions.
 //!
 //! A person, or a computed figure of merit, evaluates actions of a [`SearchSpace`] and gives [`Feedback`]: labels,
-//! preferences, ties and suggestions. The learner infers a Gaussian-process posterior over the latent utility
-//! ([`posterior`]), proposes the next action ([`propose`]) and the comparisons worth asking ([`comparisons_to_ask`],
-//! [`what_to_ask`]), and recommends an action ([`Posterior::best`]).
+//! preferences, answers of no difference and suggestions. The learner infers a Gaussian-process posterior over the latent utility
+//! ([`posterior`]), proposes the next action ([`propose`]) and the comparisons worth asking ([`proposed_comparisons`],
+//! [`proposed_comparison`]), and recommends an action ([`Posterior::best`]).
 //!
 //! All functions are pure functions of space, log, settings and seed. They do no I/O and read no clock. Equal arguments
 //! give bitwise equal results on every machine.
@@ -20,7 +20,7 @@
 //! let mut log = FeedbackLog::default();
 //! for _ in 0..12 {
 //!     let action = propose(&space, &log, &[], &settings, 1)?.action;
-//!     for comparison in comparisons_to_ask(&space, &log, action, &settings)? {
+//!     for comparison in proposed_comparisons(&space, &log, action, &settings)? {
 //!         let other = comparison.against;
 //!         let (winner, loser) = if distance(action) < distance(other) { (action, other) } else { (other, action) };
 //!         log.feedback.push(Feedback::Preference { winner, loser });
@@ -54,6 +54,7 @@ mod learner;
 mod likelihood;
 mod linalg;
 mod observations;
+mod observed_feedback;
 mod posterior;
 mod propose;
 mod random;
@@ -64,7 +65,7 @@ mod whole_grid;
 
 pub use action::ActionIndex;
 pub use comparisons::{
-    ComparisonReason, ProposedComparison, comparisons_to_ask, comparisons_to_ask_among, what_to_ask,
+    ComparisonReason, ProposedComparison, proposed_comparison, proposed_comparisons, proposed_comparisons_among,
 };
 pub use error::LearnerError;
 pub use excluded::ExcludedActions;

@@ -6,7 +6,7 @@
 //!
 //! - preference: `d = f_winner - f_loser > 0`
 //! - suggestion: the same, with its own noise
-//! - tie: `|f_a - f_b| < width`
+//! - no difference: `|f_a - f_b| < width`
 //! - label: `d = f_action` between the thresholds of its category (ordinal regression, Chu and Ghahramani 2005)
 
 use serde::{Deserialize, Serialize};

@@ -14,9 +14,10 @@ use crate::settings::LearnerSettings;
 use crate::special_functions;
 
 pub(crate) mod agreement;
-pub(crate) mod answer_probabilities;
 pub(crate) mod best_action;
+pub(crate) mod convergence_probability;
 pub(crate) mod marginals;
+pub(crate) mod preference_probability;
 #[cfg(test)]
 mod tests;
 

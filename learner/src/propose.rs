@@ -231,11 +231,11 @@ mod tests {
                 let proposal = propose(&space, &log, &[], &settings, 5).unwrap();
                 assert_eq!(proposal, propose(&space, &log, &[], &settings, 5).unwrap());
                 assert!(!log.visited.contains(&proposal.action), "{method:?} repeats at {trial}");
-                for question in comparisons(&space, &log, proposal.action, &settings) {
-                    let (a, b) = (proposal.action, question);
+                for against in comparisons(&space, &log, proposal.action, &settings) {
+                    let (a, b) = (proposal.action, against);
                     let (winner, loser) = if utility(a) > utility(b) { (a, b) } else { (b, a) };
                     if utility(a) == utility(b) {
-                        log.feedback.push(Feedback::Tie { a, b });
+                        log.feedback.push(Feedback::NoDifference { a, b });
                     } else {
                         log.feedback.push(Feedback::Preference { winner, loser });
                     }
@@ -254,7 +254,7 @@ mod tests {
         action: ActionIndex,
         settings: &LearnerSettings,
     ) -> Vec<ActionIndex> {
-        let comparisons = crate::comparisons::comparisons_to_ask(space, log, action, settings).unwrap();
+        let comparisons = crate::comparisons::proposed_comparisons(space, log, action, settings).unwrap();
         comparisons.into_iter().map(|c| c.against).collect()
     }
 

@@ -106,10 +106,10 @@ pub struct LearnerSettings {
     pub ordinal_thresholds: Vec<f64>,
     /// Noise scale of suggestions, in units of utility.
     pub coactive_noise: f64,
-    /// Noise scale of ties, in units of utility.
-    pub tie_noise: f64,
+    /// Noise scale of answers of no difference, in units of utility.
+    pub no_difference_noise: f64,
     /// Utilities that differ by less than this feel equal.
-    pub tie_width: f64,
+    pub no_difference_width: f64,
     /// Region of avoidance (ROIAL, Li et al. 2021): an action is not proposed if its mean plus this many standard
     /// deviations is below the lowest threshold, unless no other action is left. ROIAL uses -0.45. Mean and deviation
     /// are those of the function that labels are about. All methods but `random` respect it. `None` disables it.
@@ -173,8 +173,8 @@ impl LearnerSettings {
             ordinal_noise: 0.1,
             ordinal_thresholds: vec![0.0],
             coactive_noise: 0.02,
-            tie_noise: 0.02,
-            tie_width: 0.02,
+            no_difference_noise: 0.02,
+            no_difference_width: 0.02,
             avoidance: None,
             samples_per_iteration: 1,
             repeats: true,
@@ -248,8 +248,8 @@ impl LearnerSettings {
             ("preference_noise", self.preference_noise),
             ("ordinal_noise", self.ordinal_noise),
             ("coactive_noise", self.coactive_noise),
-            ("tie_noise", self.tie_noise),
-            ("tie_width", self.tie_width),
+            ("no_difference_noise", self.no_difference_noise),
+            ("no_difference_width", self.no_difference_width),
         ] {
             if !(value >= low && value <= high) {
                 let reason =

@@ -5,7 +5,7 @@
 
 use gait_learner::{
     ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, Learner, LearnerError, LearnerSettings, Link,
-    Method, SearchSpace, comparisons_to_ask, posterior, propose, propose_batch, what_to_ask,
+    Method, SearchSpace, posterior, propose, propose_batch, proposed_comparison, proposed_comparisons,
 };
 use proptest::prelude::*;
 use std::collections::HashSet;
@@ -65,7 +65,7 @@ fn exercise(space: &SearchSpace, log: &FeedbackLog, settings: &LearnerSettings) 
     }
     assert_eq!(posterior.best().is_some(), !log.visited.is_empty());
     assert!(posterior.best().is_none_or(|best| log.visited.contains(&best)));
-    what_to_ask(space, log, settings).unwrap();
+    proposed_comparison(space, log, settings).unwrap();
     let tried: std::collections::HashSet<_> = log.visited.iter().collect();
     match propose(space, log, &[], settings, 3) {
         Ok(proposal) => {
@@ -91,7 +91,7 @@ fn contradictory_feedback_keeps_probabilities_moderate() {
         log.feedback.push(Feedback::Preference { winner: b, loser: a });
         log.feedback.push(Feedback::Label { action: if i % 2 == 0 { a } else { b }, category: i % 2 });
         if i % 10 == 0 {
-            log.feedback.push(Feedback::Tie { a, b });
+            log.feedback.push(Feedback::NoDifference { a, b });
         }
     }
     for settings in all_settings() {
@@ -239,7 +239,7 @@ fn invalid_input_is_rejected_with_its_error() {
         refused(Feedback::Preference { winner: inside, loser: inside }),
         LearnerError::SelfComparison { entry: 0, .. }
     ));
-    assert!(matches!(refused(Feedback::Tie { a: inside, b: outside }), LearnerError::UnknownAction { .. }));
+    assert!(matches!(refused(Feedback::NoDifference { a: inside, b: outside }), LearnerError::UnknownAction { .. }));
     assert!(matches!(refused(Feedback::Label { action: inside, category: 2 }), LearnerError::UnknownCategory { .. }));
     assert!(propose(&space, &FeedbackLog::default(), &[outside], &settings, 0).is_err());
     for settings in [
@@ -260,7 +260,7 @@ fn any_feedback(actions: u64, categories: usize) -> impl Strategy<Value = Feedba
     let pair = (0..actions, 1..actions).prop_map(move |(a, gap)| (ActionIndex(a), ActionIndex((a + gap) % actions)));
     prop_oneof![
         3 => pair.clone().prop_map(|(winner, loser)| Feedback::Preference { winner, loser }),
-        1 => pair.clone().prop_map(|(a, b)| Feedback::Tie { a, b }),
+        1 => pair.clone().prop_map(|(a, b)| Feedback::NoDifference { a, b }),
         1 => pair.prop_map(|(suggested, over)| Feedback::Suggestion { suggested, over }),
         2 => (0..actions, 0..categories).prop_map(|(a, category)| Feedback::Label { action: ActionIndex(a), category }),
     ]
@@ -329,7 +329,7 @@ proptest! {
                 Feedback::Preference { winner, loser } => {
                     Feedback::Preference { winner: within(winner), loser: within(loser) }
                 }
-                Feedback::Tie { a, b } => Feedback::Tie { a: within(a), b: within(b) },
+                Feedback::NoDifference { a, b } => Feedback::NoDifference { a: within(a), b: within(b) },
                 Feedback::Suggestion { suggested, over } => {
                     Feedback::Suggestion { suggested: within(suggested), over: within(over) }
                 }
@@ -337,7 +337,7 @@ proptest! {
             })
             .filter(|feedback| match *feedback {
                 Feedback::Preference { winner: a, loser: b }
-                | Feedback::Tie { a, b }
+                | Feedback::NoDifference { a, b }
                 | Feedback::Suggestion { suggested: a, over: b } => a != b,
                 Feedback::Label { .. } => true,
             })
@@ -412,7 +412,7 @@ proptest! {
             match step {
                 0 => {
                     if let Ok(proposal) = learner.propose(&space, &log, &[ActionIndex(4)], &settings, 7) {
-                        learner.comparisons_to_ask(&space, &log, proposal.action, &settings).unwrap();
+                        learner.proposed_comparisons(&space, &log, proposal.action, &settings).unwrap();
                         log.visited.push(proposal.action);
                         log.feedback.push(Feedback::Label { action: proposal.action, category: 1 });
                     }
@@ -455,11 +455,14 @@ fn agrees_with_a_new_one(learner: &mut Learner, space: &SearchSpace, log: &Feedb
         propose_batch(space, log, &[ActionIndex(2)], settings, 5).ok(),
         learner.propose_batch(space, log, &[ActionIndex(2)], settings, 5).ok()
     );
-    assert_eq!(what_to_ask(space, log, settings).unwrap(), learner.what_to_ask(space, log, settings).unwrap());
+    assert_eq!(
+        proposed_comparison(space, log, settings).unwrap(),
+        learner.proposed_comparison(space, log, settings).unwrap()
+    );
     for action in [0, 7, 14].map(ActionIndex) {
         assert_eq!(
-            comparisons_to_ask(space, log, action, settings).unwrap(),
-            learner.comparisons_to_ask(space, log, action, settings).unwrap()
+            proposed_comparisons(space, log, action, settings).unwrap(),
+            learner.proposed_comparisons(space, log, action, settings).unwrap()
         );
     }
 }

@@ -5,7 +5,7 @@
 
 use gait_learner::{
     ActionIndex, Dimension, Feedback, FeedbackLog, Inference, Labels, LearnerError, LearnerSettings, Link, Method,
-    SearchSpace, Start, posterior, propose, propose_batch, what_to_ask,
+    SearchSpace, Start, posterior, propose, propose_batch, proposed_comparison,
 };
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -60,7 +60,8 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
         let [separate, centre, repeats, avoid] = flags;
         let (nugget, mut ordinal_thresholds, avoidance) = shares;
         let sd = signal_variance.sqrt();
-        let [preference_noise, ordinal_noise, coactive_noise, tie_noise, tie_width] = noises.map(|noise| noise * sd);
+        let [preference_noise, ordinal_noise, coactive_noise, no_difference_noise, no_difference_width] =
+            noises.map(|noise| noise * sd);
         ordinal_thresholds.sort_by(f64::total_cmp);
         ordinal_thresholds.dedup_by(|b, a| *b - *a < 2e-3);
         for threshold in &mut ordinal_thresholds {
@@ -79,8 +80,8 @@ fn any_settings() -> impl Strategy<Value = LearnerSettings> {
             ordinal_noise: within(ordinal_noise, 1e-3, 1e3),
             ordinal_thresholds,
             coactive_noise: within(coactive_noise, 1e-3, 1e3),
-            tie_noise: within(tie_noise, 1e-3, 1e3),
-            tie_width: within(tie_width, 1e-3, 1e3),
+            no_difference_noise: within(no_difference_noise, 1e-3, 1e3),
+            no_difference_width: within(no_difference_width, 1e-3, 1e3),
             avoidance: avoid.then_some(avoidance),
             repeats,
             ..LearnerSettings::of(method)
@@ -99,7 +100,7 @@ fn feedback(space: &SearchSpace, settings: &LearnerSettings, draw: (u8, u64, u64
     match kind {
         0 | 1 => Some(Feedback::Label { action: a, category: category % settings.categories() }),
         _ if a == b => None,
-        2 => Some(Feedback::Tie { a, b }),
+        2 => Some(Feedback::NoDifference { a, b }),
         3 => Some(Feedback::Suggestion { suggested: a, over: b }),
         _ => Some(Feedback::Preference { winner: a, loser: b }),
     }
@@ -133,7 +134,7 @@ proptest! {
         for result in [
             propose(&space, &log, &[], &settings, 1).map(drop),
             propose_batch(&space, &log, &[], &settings, 1).map(drop),
-            what_to_ask(&space, &log, &settings).map(drop),
+            proposed_comparison(&space, &log, &settings).map(drop),
             posterior.best_of_visited(5, 1).map(drop),
             posterior.best_of_grid(2, 1).map(drop),
         ] {

@@ -7,10 +7,13 @@
 mod problems;
 #[path = "../examples/regret/simulation.rs"]
 mod simulation;
+#[path = "../examples/regret/table.rs"]
+mod table;
 
 use gait_learner::{LearnerSettings, Method};
 use problems::Problem;
 use simulation::{Person, champion, run};
+use table::{DEFAULT_COLUMNS, Table};
 
 const COMPARISONS: usize = 25;
 
@@ -53,4 +56,27 @@ fn eubo_beats_random_search_on_hartmann_3() {
     let random = mean_regret("hart3", 0.0, None);
     let eubo = mean_regret("hart3", 0.0, Some(&LearnerSettings::of(Method::Eubo)));
     assert!(eubo < 0.6 * random, "random {random} eubo {eubo}");
+}
+
+#[test]
+fn eubo_beats_random_search_on_the_gaits_of_an_atlas() {
+    for (name, gaits) in [("atlas1", 254), ("atlas1m", 171)] {
+        let table = Table::built_in(name, DEFAULT_COLUMNS).unwrap().unwrap();
+        let person = |seed| table.person(seed);
+        let problem = person(40);
+        assert!(problem.space.len() == 11_664 && problem.converged.iter().all(|converged| *converged), "{name}");
+        let mut utilities: Vec<u64> = problem.utility.iter().map(|utility| utility.to_bits()).collect();
+        utilities.sort_unstable();
+        utilities.dedup();
+        assert!(utilities.len() > gaits / 2 && utilities.len() <= gaits, "{name}: {} utilities", utilities.len());
+        let (mut random, mut eubo) = (0.0, 0.0);
+        for seed in 40..52 {
+            let problem = person(seed);
+            let last = |regrets: Vec<f64>| *regrets.last().unwrap();
+            random += last(champion(Person::new(&problem, 0.0, seed), 10));
+            let settings = LearnerSettings::of(Method::Eubo);
+            eubo += last(run(Person::new(&problem, 0.0, seed), &settings, 10, 1).unwrap());
+        }
+        assert!(eubo < random, "{name}: random {random} eubo {eubo}");
+    }
 }

@@ -15,7 +15,7 @@ mod splitmix;
 mod tuned_actions;
 
 use arguments::argument;
-use gait_optimizer::execution::{ExecutionOptions, WalksOnGround, simulate};
+use gait_optimizer::execution::{ExecutionOptions, SimulatedWalksOnGround, simulate};
 use gait_optimizer::{
     CancelToken, Gait, GaitProblem, LocalOptimumChoice, SolveOptions, SolveOutcome, SolveStatus, Subject, TunedBounds,
     solve,
@@ -124,7 +124,7 @@ fn row(name: &str, gait: Option<&Gait>) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn ground(ground: &WalksOnGround) -> String {
+fn ground(ground: &SimulatedWalksOnGround) -> String {
     let [low, high] = ground.completed_share_interval;
     format!(
         "{:.3} ({low:.2}-{high:.2})  {:4.1}     {:4}  {:3}",

@@ -44,7 +44,7 @@ pub use closed_loop::STRIDES;
 pub use hybrid_walker::Fall;
 pub use identity::{CertifiedGait, Difference};
 pub use push::{LARGEST_PUSH_M_S, Pushes, RECOVERY_STRIDES};
-pub use return_map::{Multiplier, ReturnMap};
+pub use return_map::{FloquetMultiplier, ReturnMap};
 
 use crate::body::WalkerModel;
 use crate::gait::Gait;

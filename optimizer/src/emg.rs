@@ -6,7 +6,7 @@
 //! 3. Distance from normal walking: [`emg_rmse`].
 
 mod activity;
-mod cycle;
+mod cycle_activity;
 mod emg_filter;
 mod emg_recording;
 mod envelope;
@@ -15,7 +15,7 @@ mod model_activity;
 mod raw_signal_checks;
 
 pub use activity::Activity;
-pub use cycle::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};
+pub use cycle_activity::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};
 pub use emg_recording::EmgRecording;
 pub use envelope::Envelope;
 pub use filter_settings::EmgSettings;

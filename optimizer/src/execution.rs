@@ -11,6 +11,7 @@
 mod actuator;
 mod control_period;
 mod disturbance;
+mod execution_report;
 mod foot_contact;
 mod gains;
 mod ground;
@@ -18,19 +19,18 @@ mod human;
 mod planned_stride;
 mod plant;
 mod prosthesis;
-mod random;
-mod report;
+mod random_stream;
+mod report_sentence;
 mod sensors;
 mod simulated_walk;
 mod stride_clock;
 mod terrain;
-mod words;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod simulation_tests;
 
-pub use report::{ExecutionReport, StridesOnYield, SurvivedPushes, WalksOnGround};
+pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYield, SurvivedPushes};
 
 use crate::cancel_token::CancelToken;
 use crate::certificate::CertifiedGait;
@@ -126,7 +126,7 @@ pub fn simulate(
         if cancel.is_cancelled() {
             return Ok(None);
         }
-        grounds.push(WalksOnGround::of(ground_m, &outcomes));
+        grounds.push(SimulatedWalksOnGround::of(ground_m, &outcomes));
     }
     let strides_by_yield = YIELD_LADDER_M
         .into_iter()

@@ -11,21 +11,21 @@ use std::cell::RefCell;
 mod at_limit;
 mod bound;
 mod conflict;
+mod explanation_sentences;
 mod given_bound;
 mod relaxation;
 mod search;
 mod solves;
-mod words;
 
 use at_limit::domains_at_limit;
 use bound::{Level, loosened, loosest, step};
 use conflict::{BoundSet, conflict, remedies};
+pub use explanation_sentences::{quantity, status_in_words};
 pub use given_bound::BoundValue;
 use relaxation::of_one_bound;
 pub use relaxation::{JointRelaxation, Relaxation, RelaxedBound};
 use search::Search;
 use solves::{FailedSearch, SearchEnd, Solves};
-pub use words::{quantity, status_in_words};
 
 /// Largest number of bounds in a joint relaxation.
 const MOST_TOGETHER: usize = 3;

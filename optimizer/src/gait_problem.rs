@@ -4,7 +4,7 @@
 //! |---|---|
 //! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity`], [`transitions`] |
-//! | C3 physical limits: friction, unilateral contact, clearance, touchdown | [`contact_limits`] |
+//! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
 //! | C8 fibre kinematics | [`muscle_fibres`] |
@@ -13,6 +13,7 @@
 pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;
+pub mod foot_clearance;
 mod gait_of_variables;
 mod hermite_simpson;
 pub mod hip_velocity;

@@ -7,8 +7,8 @@
 //! No step fails: if bounds make a QP infeasible, its constraints are relaxed, and the gait problem decides whether a
 //! gait exists.
 
-pub mod motion;
-pub mod muscles;
+pub mod guessed_motion;
+pub mod guessed_muscles;
 pub mod posture;
 
 /// Stride time and length of an initial guess.

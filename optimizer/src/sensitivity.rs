@@ -9,14 +9,14 @@ mod active;
 mod bound_sensitivity;
 mod parameter;
 mod result_derivatives;
-mod words;
+mod sensitivity_sentences;
 
 pub use active::ActiveConstraint;
 pub use bound_sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError};
 pub use result_derivatives::ResultDerivatives;
 
 use crate::gait_problem::GaitProblem;
-use crate::solve::{SolveOptions, WarmStart, final_settings};
+use crate::solve::{SolveOptions, WarmStart};
 use crate::tuned_bounds::TunedBounds;
 
 /// The sensitivities of the converged gait `solution` of `problem`. `options` are those of its solve.
@@ -28,7 +28,7 @@ pub fn sensitivities(
     solution: &WarmStart,
     options: &SolveOptions,
 ) -> Result<GaitSensitivities, GaitSensitivityError> {
-    let points = parameter::PointSensitivities::new(problem, solution, &final_settings(options))?;
+    let points = parameter::PointSensitivities::new(problem, solution, options)?;
     let bounds = (0..TunedBounds::COUNT).map(|bound| points.of_bound(problem, solution, bound));
     Ok(GaitSensitivities { cost_of_transport: points.cost_of_transport(problem, solution), bounds: bounds.collect() })
 }

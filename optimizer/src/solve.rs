@@ -9,10 +9,10 @@ mod error;
 mod gait_results;
 mod multi_start;
 mod options;
-mod outcome;
 mod phases;
 mod progress;
-mod report;
+mod solve_outcome;
+mod solve_report;
 mod solver_settings;
 mod warm_start;
 
@@ -24,11 +24,11 @@ pub use error::SolveError;
 pub use gait_results::GaitResults;
 pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use options::{LocalOptimumChoice, SolveOptions};
-use outcome::{SolveTally, other_local_optimum, outcome};
 use phases::SolveContext;
 pub(crate) use phases::final_settings;
 pub use progress::{IterationRecord, SolvePhase};
-pub use report::{
+use solve_outcome::{SolveTally, other_local_optimum, outcome};
+pub use solve_report::{
     CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
     SolveStatus, StartedFrom, Violation,
 };

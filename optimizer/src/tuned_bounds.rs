@@ -73,9 +73,9 @@ tuned_bounds! {
     /// Upper bound of the magnitude of every coordinate acceleration, rad/s² (m/s² for the hip point).
     a2: UPPER, 90.0, (5.0, 1000.0), "coordinate acceleration", "rad/s²";
     /// Lower bound of the hip velocity v_hip, m/s.
-    a3: LOWER, 0.3, (0.05, 3.0), "hip velocity lower bound", "m/s";
+    a3: LOWER, 0.3, (0.05, 3.0), "minimum hip velocity", "m/s";
     /// Upper bound of the hip velocity v_hip, m/s.
-    a4: UPPER, 1.4, (0.05, 3.0), "hip velocity upper bound", "m/s";
+    a4: UPPER, 1.4, (0.05, 3.0), "maximum hip velocity", "m/s";
     /// Lower bound of the swing-foot clearance at mid-swing, m.
     a5: LOWER, 0.0, (0.0, 0.3), "swing-foot clearance", "m";
     /// Upper bound of the magnitude of the torso lean, rad.

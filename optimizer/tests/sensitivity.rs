@@ -43,6 +43,9 @@ fn active_bounds_are_those_whose_change_changes_the_gait() {
     let found = sensitivities(&problem(), &solved.warm_start, &options()).unwrap();
     let is_active = |(bound, interval): (&BoundSensitivity, &UnchangedBound)| {
         assert_eq!(!bound.active.is_empty(), interval.is_active(bound.value), "{bound:?} {interval:?}");
+        if bound.active.is_empty() {
+            assert_eq!(bound.interval, (interval.least, interval.most), "{bound:?} {interval:?}");
+        }
         !bound.active.is_empty()
     };
     let active = found.bounds.iter().zip(&solved.report.unchanged_bounds).map(is_active);

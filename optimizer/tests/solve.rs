@@ -57,13 +57,13 @@ fn warm_start_converges_after_a_cold_solve() {
 }
 
 #[test]
-fn figures_of_a_gait_are_those_of_its_report_and_every_other_value_differs() {
+fn results_of_a_gait_are_those_of_its_report_and_every_other_value_differs() {
     let reference = problem("").reference;
     for outcome in [&*COLD, &solved(&problem(""), None, 3)] {
-        let figures = GaitResults::of(&outcome.gait, &reference).unwrap();
+        let results = GaitResults::of(&outcome.gait, &reference).unwrap();
         let stated = GaitResults::of_report(&outcome.report);
-        assert_eq!(figures, stated);
-        let scaled = |figure: &mut f64| *figure *= 1.0 + 1e-6;
+        assert_eq!(results, stated);
+        let scaled = |value: &mut f64| *value *= 1.0 + 1e-6;
         let changes: [fn(&mut GaitResults) -> &mut f64; 7] = [
             |f| &mut f.cost_of_transport,
             |f| &mut f.gait_rmse_rad,
@@ -73,17 +73,17 @@ fn figures_of_a_gait_are_those_of_its_report_and_every_other_value_differs() {
             |f| &mut f.durations_s[7],
             |f| &mut f.vhip_m_s[3],
         ];
-        for figure in changes {
+        for value in changes {
             let mut other = stated;
-            scaled(figure(&mut other));
-            let (_, changed, computed) = other.difference(&figures).unwrap();
+            scaled(value(&mut other));
+            let (_, changed, computed) = other.difference(&results).unwrap();
             assert!(changed > computed, "{other:?}");
         }
     }
 }
 
-/// The gait with other figures, and times that match them.
-fn with_figures(gait: &Gait, change: impl Fn(&mut Gait)) -> Gait {
+/// The gait with other results, and times that match them.
+fn with_results(gait: &Gait, change: impl Fn(&mut Gait)) -> Gait {
     let mut changed = gait.clone();
     change(&mut changed);
     let mut start = 0.0;
@@ -98,19 +98,19 @@ fn with_figures(gait: &Gait, change: impl Fn(&mut Gait)) -> Gait {
 }
 
 #[test]
-fn figures_of_a_gait_that_differ_from_its_motion_are_detected() {
+fn results_of_a_gait_that_differ_from_its_motion_are_detected() {
     let gait = &COLD.gait;
     let hip_is_off = progress_error_m(gait).unwrap();
     assert!(hip_is_off < 2e-6, "{hip_is_off}");
     for d in 0..8 {
-        let longer = with_figures(gait, |gait| gait.domains[d].duration_s += 2e-5);
+        let longer = with_results(gait, |gait| gait.domains[d].duration_s += 2e-5);
         longer.validate().unwrap();
         let hip_is_off = progress_error_m(&longer).unwrap();
         assert!(hip_is_off > 1e-5, "domain {d}: {hip_is_off}");
     }
     // The certificate compares the others with the motion at the nodes.
     let objects = |change: fn(&mut Gait), failure: &str| {
-        let failures = certify(&with_figures(gait, change)).unwrap().failures;
+        let failures = certify(&with_results(gait, change)).unwrap().failures;
         assert!(failures.iter().any(|words| words.starts_with(failure)), "{failures:?}");
     };
     objects(|gait| gait.stride_length_m *= 1.0 + 1e-5, "C2 continuity of the stride");

@@ -57,8 +57,8 @@ def started(new: dict[str, Any]) -> str:
     return study
 
 
-script = started({"name": "script", "trial_budget": 5, "evaluation": "script", "feedback_mode": "human"})
-study = started({"name": "fuzzed", "trial_budget": 6, "feedback_mode": "mixed"})
+script = started({"name": "script", "number_of_trials": 5, "evaluation": "script", "answer_source": "people"})
+study = started({"name": "fuzzed", "number_of_trials": 6, "answer_source": "both"})
 while call("GET", f"{v1}/studies/{study}")["state"] != "finished":
     time.sleep(0.5)
 trials = [trial for trial in call("GET", f"{v1}/studies/{study}/trials")["items"] if trial["state"] == "converged"]

@@ -25,7 +25,7 @@ from gaitwright_client.api.studies import (
 from gaitwright_client.api.subjects import create_subject, get_subject
 from gaitwright_client.api.trials import get_certificate, list_trials, request_certificate
 from gaitwright_client.models import (
-    Ask,
+    AskRequest,
     Bounds,
     Certificate,
     CreatedPreference,
@@ -33,7 +33,7 @@ from gaitwright_client.models import (
     Dimension,
     DimensionName,
     Evaluation,
-    FeedbackMode,
+    AnswerSource,
     Job,
     JobState,
     MilestonePage,
@@ -52,14 +52,14 @@ from gaitwright_client.models import (
     StudyState,
     StudyView,
     Subject,
-    Tell,
+    TellRequest,
     Trial,
     TrialPage,
     TrialState,
 )
 from gaitwright_client.types import UNSET, File, Response, Unset
 
-BUDGET = 10
+TRIALS = 10
 SECONDS = 60
 FIGURE = "course-gait-rmse-of-the-best-action-by-iteration"
 
@@ -108,22 +108,22 @@ def trials_of(client: Client, study: UUID) -> list[Trial]:
 
 def by_script(client: Client, subject: UUID) -> None:
     """A script evaluates every trial."""
-    new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, trial_budget=BUDGET)
+    new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, number_of_trials=TRIALS)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
-        asked = ask_for_trial.sync_detailed(study.id, client=client, body=Ask(script="treadmill"))
+        asked = ask_for_trial.sync_detailed(study.id, client=client, body=AskRequest(script="treadmill"))
         if asked.status_code == HTTPStatus.CONFLICT:
             break
         trial = given(Trial, asked.parsed)
         rmse = measure(trial.action)
         told = (
-            Tell(outcome=Outcome.NOT_CONVERGED, reason="the walker stumbled")
+            TellRequest(outcome=Outcome.NOT_CONVERGED, reason="the walker stumbled")
             if rmse is None
-            else Tell(outcome=Outcome.CONVERGED, gait_rmse_rad=rmse)
+            else TellRequest(outcome=Outcome.CONVERGED, gait_rmse_rad=rmse)
         )
         given(Trial, tell_outcome.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)
-    assert [trial.number for trial in trials] == list(range(1, BUDGET + 1)), trials
+    assert [trial.number for trial in trials] == list(range(1, TRIALS + 1)), trials
     best = given(MilestonePage, list_study_history.sync(study.id, client=client)).items[-1]
     wait_until(client, study.id, StudyState.FINISHED)
     print(f"python: {len(trials)} trials, best: trial {best.number}, {best.gait_rmse_rad:.4f} rad")
@@ -147,7 +147,7 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
             Dimension(name=DimensionName.A6, values=[0.05, 0.1, 0.15, 0.2], lengthscale=0.05),
         ]
     )
-    new = NewStudy(subject_id=subject, feedback_mode=FeedbackMode.HUMAN, search_space=space, trial_budget=4)
+    new = NewStudy(subject_id=subject, answer_source=AnswerSource.PEOPLE, search_space=space, number_of_trials=4)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
     compared = 1
     while wait_until(client, study, StudyState.WAITING, StudyState.FINISHED) == StudyState.WAITING:
@@ -180,7 +180,7 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
 
 def with_a_job(client: Client, subject: UUID) -> None:
     """Gait RMSE answers the comparisons; a certificate is made on request."""
-    new = NewStudy(subject_id=subject, trial_budget=BUDGET)
+    new = NewStudy(subject_id=subject, number_of_trials=TRIALS)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
     wait_until(client, study, StudyState.FINISHED)
     followed = 0

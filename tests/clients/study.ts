@@ -12,7 +12,7 @@ type State = Schemas["StudyState"];
 type Trial = Schemas["Trial"];
 type Reply<T> = { data?: T; error?: { detail: string }; response: Response };
 
-const BUDGET = 10;
+const TRIALS = 10;
 const SECONDS = 60;
 const FIGURE = "course-gait-rmse-of-the-best-action-by-iteration";
 const address = process.argv[2];
@@ -74,7 +74,7 @@ async function waitUntil(id: string, ...states: State[]): Promise<State> {
 
 /** A script evaluates every trial. */
 async function byScript(subject_id: string): Promise<void> {
-  const body = { subject_id, name: "typescript", evaluation: "script" as const, trial_budget: BUDGET };
+  const body = { subject_id, name: "typescript", evaluation: "script" as const, number_of_trials: TRIALS };
   const { id } = created("studies", await client.POST("/api/v1/studies", { body }));
   for (;;) {
     const asked = await client.POST("/api/v1/studies/{id}/ask", {
@@ -91,7 +91,7 @@ async function byScript(subject_id: string): Promise<void> {
     given(await client.POST("/api/v1/trials/{id}/tell", { params: { path: { id: trial.id } }, body: told }));
   }
   const numbers = (await trialsOf(id)).map((trial) => trial.number);
-  check(numbers.length === BUDGET && numbers.every((number, place) => number === place + 1), numbers);
+  check(numbers.length === TRIALS && numbers.every((number, place) => number === place + 1), numbers);
   await waitUntil(id, "finished");
   const history = given(await client.GET("/api/v1/studies/{id}/history", { params: { path: { id } } }));
   const best = history.items.at(-1);
@@ -107,7 +107,7 @@ async function byAPerson(subject_id: string): Promise<void> {
       { name: "a6", values: [0.05, 0.1, 0.15, 0.2], lengthscale: 0.05 },
     ],
   };
-  const body = { subject_id, search_space, feedback_mode: "human" as const, trial_budget: 4 };
+  const body = { subject_id, search_space, answer_source: "people" as const, number_of_trials: 4 };
   const { id } = created("studies", await client.POST("/api/v1/studies", { body }));
   const params = { path: { id } };
   let compared = 1;
@@ -150,7 +150,7 @@ async function byAPerson(subject_id: string): Promise<void> {
 
 /** Gait RMSE answers the comparisons; a certificate is made on request. */
 async function withAJob(subject_id: string): Promise<void> {
-  const body = { subject_id, trial_budget: BUDGET };
+  const body = { subject_id, number_of_trials: TRIALS };
   const { id } = created("studies", await client.POST("/api/v1/studies", { body }));
   await waitUntil(id, "finished");
   let followed = 0;

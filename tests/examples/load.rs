@@ -10,7 +10,7 @@
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
 use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::workers::{Assignment, Evaluate, GaitSolver};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
@@ -100,8 +100,8 @@ async fn main() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
-    let mixed = FeedbackMode::Mixed;
-    let study = service.study(|new| (new.trial_budget, new.muscles, new.feedback_mode) = (15, true, mixed)).await;
+    let mixed = AnswerSource::Both;
+    let study = service.study(|new| (new.number_of_trials, new.muscles, new.answer_source) = (15, true, mixed)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits: Vec<Trial> = Vec::new();
     for trial in service.trials(study).await {
@@ -112,12 +112,12 @@ async fn main() {
     service.stop().await;
     large::fill_to(&database, study, large::TRIALS - 100).await;
     let service = Service::start(&database, Both(Analytic::default()), 1).await;
-    let more = json!({"trial_budget": 10_000});
+    let more = json!({"number_of_trials": 10_000});
     // Certification belongs to the harness, and is complete by now.
     service.stop_passing_gaits().await;
     let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &more).await;
     println!("the study of {} trials goes on: {}", large::TRIALS - 100, extended.status);
-    let solved = service.study(|new| (new.trial_budget, new.muscles) = (500, true)).await;
+    let solved = service.study(|new| (new.number_of_trials, new.muscles) = (500, true)).await;
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let router = service.router();

@@ -5,10 +5,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::StudyId;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::users::answer_once;
@@ -21,24 +21,24 @@ async fn main() {
     for answers in if given.is_empty() { vec![30, 200] } else { given } {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (390, FeedbackMode::Human)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (390, AnswerSource::People)).await;
         for _ in 0..answers {
             answer_once(&service, study).await;
         }
-        let beliefs = Arc::new(Beliefs::default());
-        let (all, points) = history(&service, study, &beliefs).await;
+        let analyses = Arc::new(Analyses::default());
+        let (all, points) = history(&service, study, &analyses).await;
         answer_once(&service, study).await;
-        let (again, _) = history(&service, study, &beliefs).await;
+        let (again, _) = history(&service, study, &analyses).await;
         println!("{answers} answers: {points} points in {all:.2?}, after one more answer in {again:.2?}");
         service.stop().await;
     }
 }
 
-async fn history(service: &Service, study: StudyId, beliefs: &Arc<Beliefs>) -> (Duration, usize) {
+async fn history(service: &Service, study: StudyId, analyses: &Arc<Analyses>) -> (Duration, usize) {
     let study = service.get(study).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let begun = Instant::now();
-    let points = service.store.clone().compute(move |pool| beliefs.utility_history(pool, &snapshot)).await;
+    let points = service.store.clone().compute(move |pool| analyses.utility_history(pool, &snapshot)).await;
     (begun.elapsed(), points.unwrap().unwrap().len())
 }

@@ -5,7 +5,7 @@ use crate::service::Service;
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gaitwright_store::commit;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -21,10 +21,10 @@ pub async fn filled() -> (TempDir, PathBuf) {
 /// Writes a record with a row in every table.
 pub async fn fill(database: &Path) {
     let service = Service::start(database, Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["code"].as_str().unwrap());
     assert_eq!(service.post(&answer, &json!({"answer": "first"})).await.status, StatusCode::OK);
     service.wait_for(study, &[StudyState::Waiting]).await;
     let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
@@ -58,13 +58,13 @@ pub async fn fill(database: &Path) {
         "insert into blind_pair_retractions select pair_id, created_at from blind_pair_answers limit 1",
         "insert into lab_sessions (id, study_id, number, trial_a, trial_b, actor, created_at) \
          select 'L', study_id, 1, min(id), max(id), 'K', '' from trials group by study_id",
-        "insert into lab_allocations (session_id, gait_a_first, nonce, created_at) \
+        "insert into lab_allocations (lab_session_id, gait_a_first, nonce, created_at) \
          values ('L', 1, lower(hex(randomblob(32))), '')",
-        "insert into controller_file_downloads (id, session_id, walk, to_device, actor, created_at) \
+        "insert into controller_file_downloads (id, lab_session_id, walk, to_device, actor, created_at) \
          values ('D', 'L', 2, 0, 'K', '')",
-        "insert into lab_session_steps (session_id, step, actor, created_at) values ('L', 'walk_1', 'K', '')",
-        "insert into lab_answers (session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
-        "insert into lab_answer_retractions (session_id, number, actor, created_at) values ('L', 1, 'K', '')",
+        "insert into lab_session_steps (lab_session_id, step, actor, created_at) values ('L', 'walk_1', 'K', '')",
+        "insert into lab_answers (lab_session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
+        "insert into lab_answer_retractions (lab_session_id, number, actor, created_at) values ('L', 1, 'K', '')",
         "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, created_at) \
          select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', '' from trials group by study_id",
         "insert into assessment_retractions (assessment_id, author, reason, created_at) values ('M', 'K', 'r', '')",
@@ -73,9 +73,9 @@ pub async fn fill(database: &Path) {
         "insert into safety_reports (id, trial_id, source, author, created_at) \
          select 'S', id, 'clinician', 'K', '' from trials limit 1",
         "insert into safety_review_reports (review_id, report_id) values ('I', 'S')",
-        "insert into measurement_files (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
-         values ('R', 'L', 1, 'motion', '{}', x'00', '', 'K', '')",
-        "insert into emg_results (id, session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
+        "insert into measurement_files (id, lab_session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+         values ('R', 'L', 1, 'joint_angles', '{}', x'00', '', 'K', '')",
+        "insert into emg_results (id, lab_session_id, document, actor, created_at) values ('E', 'L', '{}', 'K', '')",
         "insert into subject_muscles (subject_id, definition, actor, created_at) \
          select id, '{}', 'K', '' from subjects limit 1",
         "insert into subject_corrections (subject_id, height_m, body_mass_kg, reason, actor, created_at) \

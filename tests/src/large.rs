@@ -14,7 +14,7 @@ pub const TRIALS: u32 = 10_000;
 /// A service on a record with such a study, and one of its trials.
 pub async fn service(database: &Path) -> (Service, StudyId, TrialId) {
     let service = Service::start(database, Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await[0].id;
     service.stop().await;
@@ -73,7 +73,7 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     .execute(&mut **writer)
     .await
     .unwrap();
-    sqlx::query("update studies set trial_budget = ?1 where id = ?2")
+    sqlx::query("update studies set number_of_trials = ?1 where id = ?2")
         .bind(trials)
         .bind(study.to_string())
         .execute(&mut **writer)
@@ -111,7 +111,7 @@ pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(St
         format!("/studies/{study}"),
         format!("/studies/{study}/live"),
         format!("/studies/{study}?sort=a5&order=ascending&state=converged&text=drawn&page=3"),
-        format!("/studies/{study}/belief"),
+        format!("/studies/{study}/analysis"),
         "/system".to_owned(),
         format!("/studies/{study}/compare"),
         format!("/trials/{trial}"),

@@ -21,7 +21,7 @@ pub fn electromyogram(strength: f64) -> String {
 }
 
 /// Ten seconds of the prosthetic joints at 100 Hz.
-pub fn motion() -> String {
+pub fn joint_angles() -> String {
     let mut text = "time_s,knee_R_rad,ankle_R_rad\n".to_owned();
     for k in 0..1000 {
         let phase = TAU * f64::from(k) / 110.0;

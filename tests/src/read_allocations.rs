@@ -5,7 +5,7 @@ use sqlx::Row;
 
 /// Whether walk 2 of a session is with gait A.
 pub async fn gait_a_first(store: &Store, session: LabSessionId) -> bool {
-    let row = sqlx::query("select gait_a_first from lab_allocations where session_id = ?").bind(session);
+    let row = sqlx::query("select gait_a_first from lab_allocations where lab_session_id = ?").bind(session);
     row.fetch_one(&mut **store.read().await.unwrap()).await.unwrap().get(0)
 }
 

@@ -2,7 +2,7 @@
 
 use gait_optimizer::execution::{ExecutionReport, FORMAT_VERSION};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::execution_reports::{GaitSimulated, SIMULATED};
+use gaitwright_store::execution_reports::{ExecutionReported, REPORTED};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Store, commit, events};
 use serde_json::json;
@@ -14,7 +14,7 @@ use serde_json::json;
 pub fn report() -> ExecutionReport {
     let ground = |ground_height_m: f64, completed: u32, interval: [f64; 2]| {
         json!({
-            "ground_height_m": ground_height_m, "walks": 40, "completed": completed, "fell": 38 - completed, "halted": 2,
+            "ground_height_m": ground_height_m, "simulated_walks": 40, "completed": completed, "fell": 38 - completed, "halted": 2,
             "completed_share": f64::from(completed) / 40.0, "completed_share_interval": interval, "mean_strides": 12.3,
             "knee_saturated_share": 0.18, "ankle_saturated_share": 0.0, "knee_rate_limited_share": 0.28,
             "ankle_rate_limited_share": 0.14,
@@ -38,9 +38,10 @@ pub fn report() -> ExecutionReport {
 /// If the record cannot be written.
 pub async fn keep(store: &Store, trial: &Trial) {
     let program = Actor::program().as_str().to_owned();
-    let (walks, seed, report) = (40, 7, report());
-    let simulated = GaitSimulated { trial_id: trial.id, number: trial.number, walks, seed, program, report };
+    let (simulated_walks, seed, report) = (40, 7, report());
+    let reported =
+        ExecutionReported { trial_id: trial.id, number: trial.number, simulated_walks, seed, program, report };
     let mut writer = store.write().await.unwrap();
-    events::append(&mut writer, trial.study_id, SIMULATED, &simulated).await.unwrap();
+    events::append(&mut writer, trial.study_id, REPORTED, &reported).await.unwrap();
     commit(writer).await.unwrap();
 }

@@ -1,7 +1,7 @@
 //! A user who answers the comparisons of a study.
 
 use crate::service::Service;
-use gaitwright_service::studies::pending_comparison::open_question;
+use gaitwright_service::studies::pending_comparison::pending_comparison;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::{StudyId, TrialId};
@@ -14,8 +14,8 @@ pub async fn asked(service: &Service, study: StudyId) -> (TrialId, TrialId) {
         // After an answer a study is waiting for a moment longer.
         let study = service.wait_for(study, &[StudyState::Waiting]).await;
         let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-        let question = service.store.clone().compute(move |pool| open_question(pool, &snapshot)).await.unwrap();
-        if let Some(trials) = question.unwrap().trials() {
+        let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &snapshot)).await.unwrap();
+        if let Some(trials) = pending.unwrap().trials() {
             return trials;
         }
         tokio::time::sleep(Duration::from_millis(5)).await;

@@ -10,7 +10,7 @@ use gaitwright_service::access::{Right, Role, secret, user_administration};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::commit;
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{As, FORM, member, send, service, session_of, signed_in, token, user};
 use gaitwright_tests::page_routes;
@@ -47,7 +47,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
             let method: Method = method.to_uppercase().parse().unwrap();
             let address = path
                 .replace("{id}", UNKNOWN)
-                .replace("{token}", "unknown")
+                .replace("{code}", "unknown")
                 .replace("{side}", "first")
                 .replace("{file}", "a.svg");
             for (who, rights) in &callers {
@@ -86,7 +86,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("get /studies/compare", Some(Right::Read)),
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
-    ("get /studies/{id}/belief", Some(Right::Read)),
+    ("get /studies/{id}/analysis", Some(Right::Read)),
     ("get /studies/{id}/figures", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),
@@ -110,7 +110,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("post /trials/{id}/certify", Some(Right::Run)),
     ("post /trials/{id}/explain", Some(Right::Run)),
     ("post /trials/{id}/relaxed-trial", Some(Right::Run)),
-    ("post /trials/{id}/simulate", Some(Right::Run)),
+    ("post /trials/{id}/execution-report", Some(Right::Run)),
     ("post /trials/{id}/safety-review", Some(Right::Answer)),
     ("get /reference-gaits", Some(Right::Read)),
     ("post /reference-gaits", Some(Right::Run)),
@@ -119,9 +119,9 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("post /units", Some(Right::Read)),
     ("get /rate", Some(Right::Rate)),
     ("post /rate/{id}", Some(Right::Rate)),
-    ("get /rate/pair/{token}", Some(Right::Rate)),
-    ("post /rate/pair/{token}", Some(Right::Rate)),
-    ("post /rate/pair/{token}/retract", Some(Right::Rate)),
+    ("get /rate/pair/{code}", Some(Right::Rate)),
+    ("post /rate/pair/{code}", Some(Right::Rate)),
+    ("post /rate/pair/{code}/retract", Some(Right::Rate)),
     ("get /studies/{id}/lab", Some(Right::Read)),
     ("post /studies/{id}/lab", Some(Right::Run)),
     ("get /lab-sessions/{id}", Some(Right::Read)),
@@ -129,7 +129,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("post /lab-sessions/{id}/unblind", Some(Right::Administer)),
     ("post /trials/{id}/safety-report", Some(Right::Answer)),
     ("post /lab-sessions/{id}/measurement-files/emg", Some(Right::Run)),
-    ("post /lab-sessions/{id}/measurement-files/motion", Some(Right::Run)),
+    ("post /lab-sessions/{id}/measurement-files/joint-angles", Some(Right::Run)),
     ("post /lab-sessions/{id}/process", Some(Right::Run)),
     ("get /lab", Some(Right::Rate)),
     ("get /lab/{id}", Some(Right::Rate)),
@@ -172,7 +172,7 @@ async fn every_page_is_shown_to_users_with_its_right() {
         let Some(needed) = needed else { continue };
         let address = path
             .replace("{id}", UNKNOWN)
-            .replace("{token}", "unknown")
+            .replace("{code}", "unknown")
             .replace("{side}", "first")
             .replace("{file}", "a.svg");
         for (who, rights) in &callers {
@@ -215,7 +215,7 @@ fn form_of(fields: &[(String, String)]) -> String {
 #[tokio::test]
 async fn answer_after_the_session_ended_is_kept_until_sign_in() {
     let (_folder, mut service) = service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 3)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 3)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, _) = user(&service, "R1", Role::Rater).await;
     member(&service, study, MemberKind::User, "R1").await;
@@ -383,8 +383,8 @@ async fn wrong_passwords_wait_longer_each_time_and_are_audited() {
     let waits = send(&service, &As::Nobody, &Method::POST, "/sign-in", FORM, right).await;
     assert_eq!(waits.status, StatusCode::TOO_MANY_REQUESTS, "even the right one");
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 100).await.unwrap();
-    let count = |action: &str| rows.iter().filter(|row| row.action == action).count();
-    assert_eq!((count("session.refuse"), count("session.wait")), (4, 1));
+    let count = |change: &str| rows.iter().filter(|row| row.change == change).count();
+    assert_eq!((count("sign_in.refused"), count("sign_in.delay")), (4, 1));
     assert_eq!(rows[0].detail["failed_attempts_of_network"], 5);
     service.stop().await;
 }
@@ -494,8 +494,8 @@ async fn parallel_guesses_are_limited_like_sequential_ones() {
 #[tokio::test]
 async fn programs_are_not_redirected_to_the_sign_in_form() {
     let (_folder, service) = service().await;
-    let figures = service.fetch("/metrics").await;
-    assert_eq!((figures.status, figures.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
+    let metrics = service.fetch("/metrics").await;
+    assert_eq!((metrics.status, metrics.content_type()), (StatusCode::UNAUTHORIZED, "application/problem+json"));
 }
 
 #[tokio::test]

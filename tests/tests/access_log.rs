@@ -7,7 +7,7 @@ use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use axum::middleware::map_request;
 use axum::routing::{any, get};
-use gaitwright_http::access_log::NO_SUBJECT_DATA;
+use gaitwright_http::access_log_layer::NO_SUBJECT_DATA;
 use gaitwright_http::{openapi, with_layers};
 use gaitwright_service::access::{Right, Role};
 use gaitwright_store::access_log::{self, Access, AccessKind, AccessRow, Tally};
@@ -47,7 +47,7 @@ fn operations() -> Vec<(Method, String)> {
 
 /// A path of a route.
 fn path_of(route: &str) -> String {
-    let path = route.replace("{id}", ANY_ID).replace("{token}", "secret").replace("{side}", "first");
+    let path = route.replace("{id}", ANY_ID).replace("{code}", "secret").replace("{side}", "first");
     path.replace("{link}", "secret").replace("{file}", "a.svg").replace("{name}", "conflict")
 }
 
@@ -62,7 +62,7 @@ async fn stored(service: &Service) -> Vec<AccessRow> {
 
 async fn with_study() -> (TempDir, Service, StudyId) {
     let (folder, service) = callers::service().await;
-    let study = service.study(|new| new.trial_budget = 2).await;
+    let study = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     (folder, service, study)
 }
@@ -226,10 +226,10 @@ async fn log_rows_name_caller_object_and_subject() {
 async fn every_spelling_of_an_identifier_every_refused_form_and_every_second_subject_is_logged() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let first = service.study(|new| new.trial_budget = 2).await;
+    let first = service.study(|new| new.number_of_trials = 2).await;
     let described = json!({"pseudonym": "S09", "height_m": 1.7, "body_mass_kg": 66});
     let other = service.post("/api/v1/subjects", &described).await.json()["id"].as_str().unwrap().to_owned();
-    let second = service.study(|new| (new.trial_budget, new.subject_id) = (2, other.parse().unwrap())).await;
+    let second = service.study(|new| (new.number_of_trials, new.subject_id) = (2, other.parse().unwrap())).await;
     for study in [first, second] {
         service.wait_for(study, &[StudyState::Finished]).await;
     }
@@ -374,10 +374,10 @@ async fn corrected_height_and_mass_apply_to_new_studies_only() {
     assert_eq!(problem(trial).await, before, "a study keeps the numbers that it was made with");
     // Also for trials to come.
     let extend = format!("/api/v1/studies/{study}/extend");
-    send(&service, &admin, &Method::POST, &extend, "application/json", r#"{"trial_budget": 3}"#).await;
+    send(&service, &admin, &Method::POST, &extend, "application/json", r#"{"number_of_trials": 3}"#).await;
     service.wait_for_trials(study, 3).await;
     assert_eq!(problem(service.trials(study).await[2].id).await, before);
-    let new = service.study(|new| new.trial_budget = 1).await;
+    let new = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for_trials(new, 1).await;
     let after = problem(service.trials(new).await[0].id).await;
     assert_eq!((&after["height_m"], &after["body_mass_kg"]), (&1.75.into(), &71.5.into()));

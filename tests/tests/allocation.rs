@@ -8,7 +8,7 @@ use gaitwright_service::studies::lab::{self, NewLabSession};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::blind_pairs::{self, BlindPairKind, NewBlindPair};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
     Connection, LabSessionId, Store, StudyId, TokenId, TrialId, UserId, Writer, commit, lab_sessions,
@@ -46,7 +46,7 @@ fn is_chance(right: usize, of: usize) -> bool {
 }
 
 async fn finished(service: &Service) -> (StudyId, Vec<Trial>) {
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut trials = service.trials(study).await;
     trials.retain(|trial| trial.state == TrialState::Converged);
@@ -232,7 +232,7 @@ async fn sides_of_10_000_pairs_are_balanced_and_independent_of_earlier_pairs() {
     let mut writer = service.store.write().await.unwrap();
     for number in 1..=10_000 {
         let new = NewBlindPair {
-            token: format!("{number:064}"),
+            code: format!("{number:064}"),
             study_id: study,
             rater: "R".to_owned(),
             number,
@@ -404,7 +404,7 @@ fn by_hash(sha256: &str, session: &str, created_at: &str) -> Option<bool> {
         };
         column("created_at", "TEXT", created_at.as_bytes());
         column("gait_a_first", "INTEGER", &i64::from(first).to_be_bytes());
-        column("session_id", "TEXT", session.as_bytes());
+        column("lab_session_id", "TEXT", session.as_bytes());
         if hex::encode(hash.finalize()) == sha256 {
             return Some(first);
         }
@@ -497,7 +497,7 @@ async fn everything(service: &Service, callers: &[As], ids: &[String], own: &str
                 }
                 let address = path
                     .replace("{id}", id)
-                    .replace("{token}", own)
+                    .replace("{code}", own)
                     .replace("{side}", "first")
                     .replace("{file}", "rmse.csv");
                 let answer = match form {
@@ -559,7 +559,7 @@ fn without_request(text: &str) -> String {
 async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() {
     let (folder, service) = callers::service().await;
     let (study, trials) = finished(&service).await;
-    let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
+    let human = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 8)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let rater = rater_of(&service, &[study, human]).await;
     let callers =
@@ -573,7 +573,7 @@ async fn exchanging_every_allocation_changes_no_byte_served_before_unblinding() 
             let next = format!("/api/v1/studies/{human}/blind-pairs/next");
             pair = post(&service, &rater, &next, &json!({})).await.json()["pair"].clone();
         }
-        own = pair["token"].as_str().unwrap().to_owned();
+        own = pair["code"].as_str().unwrap().to_owned();
         if !answer.is_empty() {
             post(&service, &rater, &format!("/api/v1/blind-pairs/{own}/answer"), &json!({"answer": answer})).await;
         }
@@ -747,7 +747,7 @@ async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
 #[tokio::test]
 async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 8)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 8)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let program = token(&service, &[Right::Rate, Right::Device]).await;
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
@@ -760,7 +760,7 @@ async fn answers_of_a_person_who_fetched_a_controller_file_are_recorded_as_not_b
         gaitwright_service::access::Caller::token(TokenId::fresh(), "[Rate, Device]", &[Right::Rate, Right::Device]);
     lab::for_device(&mut writer, &caller, session.id, 2).await.unwrap();
     commit(writer).await.unwrap();
-    let path = format!("/rate/pair/{}", pair["token"].as_str().unwrap());
+    let path = format!("/rate/pair/{}", pair["code"].as_str().unwrap());
     let said = send(&service, &program, &Method::POST, &path, FORM, "answer=first").await;
     assert!(said.status.is_redirection(), "{}", said.text);
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
@@ -788,7 +788,7 @@ async fn refused_controller_file_does_not_reveal_which_gait_is_unsafe() {
 #[tokio::test]
 async fn every_motion_for_a_rater_has_different_bytes() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 14)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 14)).await;
     let rater = rater_of(&service, &[study]).await;
     let mut motions: BTreeMap<TrialId, Vec<String>> = BTreeMap::new();
     let mut pictures: BTreeMap<TrialId, Vec<String>> = BTreeMap::new();
@@ -799,26 +799,23 @@ async fn every_motion_for_a_rater_has_different_bytes() {
         }
         let next = format!("/api/v1/studies/{study}/blind-pairs/next");
         let pair = post(&service, &rater, &next, &json!({})).await.json()["pair"].clone();
-        let Some(token) = pair["token"].as_str() else {
+        let Some(code) = pair["code"].as_str() else {
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         };
         let (first, second) = *sides(&service.store, study).await.last().unwrap();
-        let page = get(&service, &rater, &format!("/rate/pair/{token}")).await.text;
+        let page = get(&service, &rater, &format!("/rate/pair/{code}")).await.text;
         let drawn: Vec<&str> = page.split("<svg class=\"tiles\"").skip(1).collect();
         assert_eq!(drawn.len(), 2, "{page}");
         for (place, trial) in [first, second].into_iter().enumerate() {
             let side = ["first", "second"][place];
-            let motion = get(&service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.text;
-            assert_eq!(
-                motion,
-                get(&service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.text
-            );
+            let motion = get(&service, &rater, &format!("/api/v1/blind-pairs/{code}/motions/{side}")).await.text;
+            assert_eq!(motion, get(&service, &rater, &format!("/api/v1/blind-pairs/{code}/motions/{side}")).await.text);
             motions.entry(trial).or_default().push(motion);
             let picture = drawn[place].split_once("</svg>").unwrap().0;
             pictures.entry(trial).or_default().push(picture.to_owned());
         }
-        post(&service, &rater, &format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": "second"})).await;
+        post(&service, &rater, &format!("/api/v1/blind-pairs/{code}/answer"), &json!({"answer": "second"})).await;
     }
     let mut again = 0;
     for shown in motions.values().chain(pictures.values()) {

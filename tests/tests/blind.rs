@@ -8,7 +8,7 @@ use gaitwright_service::access::{Right, Role};
 use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::{self, As, member, rater_of, send, signed_in};
@@ -20,7 +20,7 @@ use tempfile::TempDir;
 async fn waiting(trials: u32) -> (TempDir, Service, StudyId) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, trials)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, trials)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     (folder, service, study)
 }
@@ -32,7 +32,7 @@ async fn next(service: &Service, study: StudyId) -> Value {
 }
 
 async fn say(service: &Service, pair: &Value, answer: &str) -> StatusCode {
-    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     service.post(&path, &json!({"answer": answer, "response_ms": 900})).await.status
 }
 
@@ -44,20 +44,21 @@ async fn shown(service: &Service, study: StudyId) -> Vec<BlindPair> {
 async fn responses_to_raters_reveal_no_gait() {
     let (_folder, service, study) = waiting(4).await;
     let pair = next(&service, study).await;
-    let token = pair["token"].as_str().unwrap();
+    let code = pair["code"].as_str().unwrap();
     let mut bytes = pair.to_string();
     for path in [
         "/rate".to_owned(),
-        format!("/rate/pair/{token}"),
-        format!("/api/v1/blind-pairs/{token}/motions/first"),
-        format!("/api/v1/blind-pairs/{token}/motions/second"),
+        format!("/rate/pair/{code}"),
+        format!("/api/v1/blind-pairs/{code}/motions/first"),
+        format!("/api/v1/blind-pairs/{code}/motions/second"),
     ] {
         let answer = service.fetch(&path).await;
         assert_eq!(answer.status, StatusCode::OK, "{path}: {}", answer.text);
         if path.contains("/motions/") {
             // The motion has only positions.
-            let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
-            assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{figures}");
+            let found =
+                answer.text.strip_prefix("{\"stick_figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
+            assert!(found.chars().all(|c| "[]-.,0123456789".contains(c)), "{found}");
             continue;
         }
         bytes.push_str(&answer.text);
@@ -67,7 +68,7 @@ async fn responses_to_raters_reveal_no_gait() {
         }
     }
     let taken = service.post_text(&format!("/rate/{study}"), "application/x-www-form-urlencoded", "").await;
-    assert_eq!(taken.headers["location"], format!("/rate/pair/{token}"), "the same pair until it is answered");
+    assert_eq!(taken.headers["location"], format!("/rate/pair/{code}"), "the same pair until it is answered");
     for trial in service.trials(study).await {
         for secret in [
             trial.id.to_string(),
@@ -84,11 +85,11 @@ async fn responses_to_raters_reveal_no_gait() {
     for word in ["trial", "rmse", "bound", "converged", "\"a1\"", "0.026", "stride_", ".csv", ".json", "seed"] {
         assert!(!words.contains(word), "{word}");
     }
-    // Both motions have the same length, number of figures and start position.
+    // Both motions have the same length, number of stick found and start position.
     let motion = |side: &str| {
-        let path = format!("/api/v1/blind-pairs/{token}/motions/{side}");
+        let path = format!("/api/v1/blind-pairs/{code}/motions/{side}");
         let service = &service;
-        async move { service.fetch(&path).await.json()["figures"].take() }
+        async move { service.fetch(&path).await.json()["stick_figures"].take() }
     };
     let (first, second) = (motion("first").await, motion("second").await);
     assert_eq!(first.as_array().unwrap().len(), 101);
@@ -111,7 +112,7 @@ async fn rate_to_the_end(service: &Service, who: &As, study: StudyId, answer: &s
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         }
-        let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+        let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
         let body = json!({"answer": answer}).to_string();
         let said = send(service, who, &Method::POST, &path, "application/json", &body).await;
         assert_eq!(said.status, StatusCode::OK, "{}", said.text);
@@ -128,7 +129,7 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     // One pair in ten is a repeat, by chance: one study in sixty has none.
     let mut with_repeats = None;
     for _ in 0..8 {
-        let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 40)).await;
+        let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 40)).await;
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, "first").await;
         let shown = shown(&service, study).await;
@@ -145,15 +146,15 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     let repeats = shown.iter().filter(|p| p.kind == BlindPairKind::Repeat).count();
     assert!(repeats > 0, "{repeats} repeats of {}", shown.len());
 
-    let figures = format!("/api/v1/studies/{study}/raters");
-    let before = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
+    let found = format!("/api/v1/studies/{study}/raters");
+    let before = send(&service, &admin, &Method::GET, &found, "", "").await.items();
     assert_eq!(before[0]["first_preferred"], Value::Null, "before unblinding it would tell the order of pairs");
     assert_eq!(before[0]["repeats_agree"]["of"], json!(repeats));
     let unblind = json!({"rater": "a rater", "reason": "the study has ended"}).to_string();
     let path = format!("/api/v1/studies/{study}/raters/unblind");
     let told = send(&service, &admin, &Method::POST, &path, "application/json", &unblind).await;
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
-    let after = send(&service, &admin, &Method::GET, &figures, "", "").await.items();
+    let after = send(&service, &admin, &Method::GET, &found, "", "").await.items();
     assert_eq!(after[0]["first_preferred"]["share"], 1.0, "this rater always says first");
     for (pair, (first, second)) in
         told.json()["pairs"].as_array().unwrap().iter().zip(sides(&service.store, study).await)
@@ -170,7 +171,7 @@ async fn rater_answer_counts_for_the_gait_shown_on_its_side() {
     let rater = signed_in(&service, Role::Rater).await;
     let mut swapped = std::collections::BTreeSet::new();
     for answer in ["first", "second"] {
-        let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 20)).await;
+        let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 20)).await;
         member(&service, study, MemberKind::User, "a rater").await;
         rate_to_the_end(&service, &rater, study, answer).await;
         let feedback = service.feedback(study).await;
@@ -213,7 +214,7 @@ impl Evaluate for Tall {
 async fn each_side_shows_the_gait_drawn_for_it() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Tall(Analytic::default()), 1).await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 24)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 24)).await;
     let mut orders = std::collections::BTreeSet::new();
     for _ in 0..4000 {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
@@ -221,7 +222,7 @@ async fn each_side_shows_the_gait_drawn_for_it() {
             break;
         }
         let pair = next(&service, study).await;
-        let Some(token) = pair["token"].as_str() else {
+        let Some(code) = pair["code"].as_str() else {
             tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             continue;
         };
@@ -229,8 +230,8 @@ async fn each_side_shows_the_gait_drawn_for_it() {
         let of = |id| hip_m(trials.iter().find(|trial| trial.id == id).unwrap().gait_rmse_rad.unwrap());
         let (first, second) = *sides(&service.store, study).await.last().unwrap();
         for (side, trial) in [("first", first), ("second", second)] {
-            let motion = service.fetch(&format!("/api/v1/blind-pairs/{token}/motions/{side}")).await.json();
-            let hip = motion["figures"][0][0][1].as_f64().unwrap();
+            let motion = service.fetch(&format!("/api/v1/blind-pairs/{code}/motions/{side}")).await.json();
+            let hip = motion["stick_figures"][0][0][1].as_f64().unwrap();
             assert!((hip - of(trial)).abs() < 6e-4, "{side}: {hip} m, drawn: {} m", of(trial));
         }
         if (of(first) - of(second)).abs() > 2e-3 {
@@ -245,7 +246,7 @@ async fn each_side_shows_the_gait_drawn_for_it() {
 #[tokio::test]
 async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 40)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 40)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let clinician = signed_in(&service, Role::Clinician).await;
     let script = callers::token(&service, &[Right::Read, Right::Rate]).await;
@@ -259,26 +260,26 @@ async fn answers_of_people_who_could_know_the_gaits_are_recorded_as_not_blind() 
         while pair.is_null() {
             pair = send(&service, who, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
         }
-        let token = pair["token"].as_str().unwrap();
-        let page = send(&service, who, &Method::GET, &format!("/rate/pair/{token}"), "", "").await.text;
+        let code = pair["code"].as_str().unwrap();
+        let page = send(&service, who, &Method::GET, &format!("/rate/pair/{code}"), "", "").await.text;
         assert_eq!(page.contains("recorded as not blind"), unblinded, "{page}");
-        let path = format!("/api/v1/blind-pairs/{token}/answer");
+        let path = format!("/api/v1/blind-pairs/{code}/answer");
         let said = send(&service, who, &Method::POST, &path, "application/json", "{\"answer\": \"second\"}").await;
         assert_eq!(said.status, StatusCode::OK, "{}", said.text);
         let newest = service.feedback(study).await.into_iter().rfind(|row| row.by_rater).unwrap();
         assert_eq!(newest.could_have_known, unblinded, "{who:?}");
     }
-    let figures = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
+    let found = send(&service, &clinician, &Method::GET, &format!("/api/v1/studies/{study}/raters"), "", "").await;
     let marked: Vec<_> =
-        figures.items().as_array().unwrap().iter().map(|rater| rater["could_have_known"].clone()).collect();
-    assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", figures.text);
+        found.items().as_array().unwrap().iter().map(|rater| rater["could_have_known"].clone()).collect();
+    assert_eq!(marked, [json!(1), json!(1), json!(1), json!(0)], "by name: {}", found.text);
     service.stop().await;
 }
 
 #[tokio::test]
 async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let users = send(&service, &admin, &Method::GET, "/api/v1/users", "", "").await.items();
@@ -291,11 +292,11 @@ async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
     }
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
-    for page in ["/rate".to_owned(), format!("/rate/pair/{}", pair["token"].as_str().unwrap())] {
+    for page in ["/rate".to_owned(), format!("/rate/pair/{}", pair["code"].as_str().unwrap())] {
         let page = send(&service, &rater, &Method::GET, &page, "", "").await;
         assert!(page.text.contains("recorded as not blind"), "{}", page.text);
     }
-    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, "application/json", "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
@@ -304,7 +305,7 @@ async fn answers_of_a_former_clinician_are_recorded_as_not_blind() {
 #[tokio::test]
 async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let json_of = "application/json";
@@ -312,7 +313,7 @@ async fn answer_of_a_rater_unblinded_since_the_draw_is_recorded_as_not_blind() {
     let pair = send(&service, &rater, &Method::POST, &next, json_of, "{}").await.json()["pair"].clone();
     let unblind = json!({"rater": "a rater", "reason": "adverse event"}).to_string();
     send(&service, &admin, &Method::POST, &format!("/api/v1/studies/{study}/raters/unblind"), json_of, &unblind).await;
-    let path = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let path = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &path, json_of, "{\"answer\": \"first\"}").await;
     assert!(service.feedback(study).await.iter().any(|row| row.by_rater && row.could_have_known));
     service.stop().await;
@@ -363,7 +364,7 @@ async fn skipped_pairs_and_unsafe_gaits_are_not_shown_again() {
 #[tokio::test]
 async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let (rater, admin) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Administrator).await);
     let post = async |who: &As, path: &str, body: Value| {
@@ -371,8 +372,8 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     };
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = post(&rater, &next, json!({})).await.json()["pair"].clone();
-    let token = pair["token"].as_str().unwrap();
-    post(&rater, &format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "second"})).await;
+    let code = pair["code"].as_str().unwrap();
+    post(&rater, &format!("/api/v1/blind-pairs/{code}/answer"), json!({"answer": "second"})).await;
     let path = format!("/api/v1/studies/{study}/raters/unblind");
     let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
@@ -381,9 +382,9 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let told = post(&admin, &path, json!({"rater": "a rater", "reason": "adverse event"})).await;
     assert_eq!(told.status, StatusCode::OK);
     assert_eq!(told.json()["pairs"][0]["shown_first"], json!(sides(&service.store, study).await[0].0));
-    assert!(!told.text.contains(token));
+    assert!(!told.text.contains(code));
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
-    assert_eq!((rows[0].action.as_str(), &rows[0].detail["reason"]), ("study.unblind", &json!("adverse event")));
+    assert_eq!((rows[0].change.as_str(), &rows[0].detail["reason"]), ("study.unblind_rater", &json!("adverse event")));
     loop {
         service.wait_for(study, &[StudyState::Waiting]).await;
         if !post(&rater, &next, json!({})).await.json()["pair"].is_null() {
@@ -400,7 +401,7 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     const FORM: &str = "application/x-www-form-urlencoded";
     let (_folder, service, study) = waiting(6).await;
     let pair = next(&service, study).await;
-    let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["token"].as_str().unwrap());
+    let at = |pair: &Value, what: &str| format!("/rate/pair/{}{what}", pair["code"].as_str().unwrap());
     assert_eq!(say(&service, &pair, "first").await, StatusCode::OK);
     let answers_in_force = |rows: &[gaitwright_store::feedback::FeedbackRow]| {
         rows.iter().filter(|row| row.by_rater && row.retraction.is_none()).count()
@@ -409,8 +410,8 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
     let back = service.post_text(&at(&pair, "/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     assert_eq!(answers_in_force(&service.feedback(study).await), 0);
-    let figures = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
-    assert_eq!((&figures[0]["shown"], &figures[0]["answered"]), (&json!(1), &json!(0)), "{figures}");
+    let found = service.fetch(&format!("/api/v1/studies/{study}/raters")).await.items();
+    assert_eq!((&found[0]["shown"], &found[0]["answered"]), (&json!(1), &json!(0)), "{found}");
     assert_eq!(service.post_text(&at(&pair, "/retract"), FORM, "").await.status, StatusCode::CONFLICT);
 
     // Neither an earlier answer nor a safety report can be retracted.
@@ -434,7 +435,7 @@ async fn newest_answer_can_be_retracted_once_and_no_longer_counts() {
 #[tokio::test]
 async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let rater = rater_of(&service, &[study]).await;
     let (admin, clinician) =
@@ -445,7 +446,7 @@ async fn access_page_shows_raters_and_unblinds_for_administrators_only() {
 
     let next = format!("/api/v1/studies/{study}/blind-pairs/next");
     let pair = send(&service, &rater, &Method::POST, &next, "application/json", "{}").await.json()["pair"].clone();
-    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["token"].as_str().unwrap());
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["code"].as_str().unwrap());
     send(&service, &rater, &Method::POST, &answer, "application/json", r#"{"answer": "first"}"#).await;
     let (seen, by_clinician) = (read(&admin).await, read(&clinician).await);
     assert!(seen.contains("<th scope=\"row\">a rater</th>") && seen.contains("<td>concealed</td>"), "{seen}");

@@ -8,7 +8,7 @@ use gaitwright_http::openapi;
 use gaitwright_service::access::{Right, Role};
 use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, studies};
 use gaitwright_tests::callers::{As, FORM, member, rater_of, send, service, signed_in, token};
@@ -49,12 +49,12 @@ async fn get(service: &Service, who: &As, path: &str) -> Answer {
 
 /// A study that asks people, with its first question.
 async fn waiting(service: &Service, trials: u32) -> StudyId {
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, trials)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, trials)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }
 
-/// Data that a response to a rater must not contain: identifiers, names and figures of what is rated.
+/// Data that a response to a rater must not contain: identifiers, names and values of what is rated.
 async fn secrets(service: &Service, studies_of: &[StudyId]) -> BTreeSet<String> {
     let mut secrets = BTreeSet::new();
     let mut reader = service.store.read().await.unwrap();
@@ -89,7 +89,7 @@ fn addresses() -> Vec<(Method, String)> {
 #[tokio::test]
 async fn no_address_reveals_rated_gaits_to_a_rater() {
     let (_folder, service) = service().await;
-    let automatic = service.study(|new| (new.name, new.trial_budget) = (Some("stiff ankle".to_owned()), 12)).await;
+    let automatic = service.study(|new| (new.name, new.number_of_trials) = (Some("stiff ankle".to_owned()), 12)).await;
     service.wait_for(automatic, &[StudyState::Finished]).await;
     let study = waiting(&service, 6).await;
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -103,7 +103,7 @@ async fn no_address_reveals_rated_gaits_to_a_rater() {
     // Another rater's pair, which this one must not see.
     let other = post(&service, &program, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
     let own = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let (other, own) = (other["pair"]["token"].as_str().unwrap(), own["pair"]["token"].as_str().unwrap());
+    let (other, own) = (other["pair"]["code"].as_str().unwrap(), own["pair"]["code"].as_str().unwrap());
     let pairs = [own, other];
     let secrets = secrets(&service, &[automatic, study]).await;
     let (session, subject) = (session["id"].as_str().unwrap().to_owned(), service.subject().await.to_string());
@@ -112,10 +112,10 @@ async fn no_address_reveals_rated_gaits_to_a_rater() {
     let mut seen = 0;
     for (method, path) in addresses() {
         for id in if path.contains("{id}") { &ids[..] } else { &ids[..1] } {
-            for token in &pairs[..if path.contains("{token}") { 2 } else { 1 }] {
+            for code in &pairs[..if path.contains("{code}") { 2 } else { 1 }] {
                 let address = path
                     .replace("{id}", id)
-                    .replace("{token}", token)
+                    .replace("{code}", code)
                     .replace("{side}", "first")
                     .replace("{file}", "rmse.csv");
                 let (kind, bodies): (&str, &[&str]) = match (&method, path.starts_with("/api/")) {
@@ -125,7 +125,7 @@ async fn no_address_reveals_rated_gaits_to_a_rater() {
                 };
                 for body in bodies {
                     let answer = send(&service, &rater, &method, &address, kind, body).await;
-                    check(&format!("{method} {address} {body}"), &answer, id, token, &secrets);
+                    check(&format!("{method} {address} {body}"), &answer, id, code, &secrets);
                     seen += 1;
                 }
             }
@@ -136,19 +136,20 @@ async fn no_address_reveals_rated_gaits_to_a_rater() {
 }
 
 /// Checks a response against the secrets, except those that the rater has sent.
-fn check(what: &str, answer: &Answer, id: &str, token: &str, secrets: &BTreeSet<String>) {
+fn check(what: &str, answer: &Answer, id: &str, code: &str, secrets: &BTreeSet<String>) {
     assert!(!answer.status.is_server_error(), "{what}: {}", answer.text);
     let mut bytes = answer.text.clone();
     for (name, value) in &answer.headers {
         assert!(HEADERS.contains(&name.as_str()), "{what}: {name}: {value:?}");
         bytes.push_str(value.to_str().unwrap());
     }
-    let bytes = bytes.replace(id, "").replace(token, "");
+    let bytes = bytes.replace(id, "").replace(code, "");
     // A motion is positions to the millimetre, and nothing else.
     if answer.status == StatusCode::OK && what.contains("/motions/") {
-        let figures = answer.text.strip_prefix("{\"figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
-        assert!(figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
-        let digits = figures.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
+        let stick_figures =
+            answer.text.strip_prefix("{\"stick_figures\":").and_then(|rest| rest.strip_suffix('}')).unwrap();
+        assert!(stick_figures.chars().all(|c| "[]-.,0123456789".contains(c)), "{what}");
+        let digits = stick_figures.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|n| n.split_once('.'));
         assert!(digits.into_iter().all(|(_, decimals)| decimals.len() <= 3), "{what}");
         return;
     }
@@ -159,7 +160,7 @@ fn check(what: &str, answer: &Answer, id: &str, token: &str, secrets: &BTreeSet<
 
 /// What is left of an answer without what names the pair and what is drawn of it.
 fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, String)>) {
-    let mut text = answer.text.replace(pair["token"].as_str().unwrap(), "TOKEN");
+    let mut text = answer.text.replace(pair["code"].as_str().unwrap(), "TOKEN");
     if let Some((before, rest)) = text.clone().split_once("<noscript data-strips>") {
         text = format!("{before}{}", rest.split_once("</noscript>").unwrap().1);
     }
@@ -205,20 +206,20 @@ async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<BlindPairKi
             answer_too(service, &clinician, study, &shown).await;
         }
         kinds.push(shown.kind);
-        let token = pair["token"].as_str().unwrap();
-        let page = get(service, &rater, &format!("/rate/pair/{token}")).await;
-        let motion = get(service, &rater, &format!("/api/v1/blind-pairs/{token}/motions/first")).await;
-        let path = format!("/rate/pair/{token}");
+        let code = pair["code"].as_str().unwrap();
+        let page = get(service, &rater, &format!("/rate/pair/{code}")).await;
+        let motion = get(service, &rater, &format!("/api/v1/blind-pairs/{code}/motions/first")).await;
+        let path = format!("/rate/pair/{code}");
         let answered = if turn % 2 == 0 {
-            let path = format!("/api/v1/blind-pairs/{token}/answer");
+            let path = format!("/api/v1/blind-pairs/{code}/answer");
             post(service, &rater, &path, &json!({"answer": "first"})).await
         } else {
             send(service, &rater, &Method::POST, &path, FORM, "answer=first").await
         };
         let again = get(service, &rater, &path).await;
-        let saved = get(service, &rater, &format!("/rate?saved={token}")).await;
+        let saved = get(service, &rater, &format!("/rate?saved={code}")).await;
         let saved = saved.text.split_once("Saved ").unwrap().1.split_once("UTC").unwrap().1;
-        let saved = saved.split_once("</div>").unwrap().0.replace(token, "TOKEN");
+        let saved = saved.split_once("</div>").unwrap().0.replace(code, "TOKEN");
         looks.insert(format!(
             "{:?} {:?} {:?} {:?} {:?}",
             masked(&next, &pair),
@@ -263,13 +264,13 @@ async fn rater_retracts_an_answer_that_a_clinician_retracted_and_sees_no_differe
     let study = waiting(&service, 6).await;
     let (rater, clinician) = (rater_of(&service, &[study]).await, signed_in(&service, Role::Clinician).await);
     let pair = post(&service, &rater, &format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
-    post(&service, &rater, &format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": "first"})).await;
+    let code = pair["pair"]["code"].as_str().unwrap().to_owned();
+    post(&service, &rater, &format!("/api/v1/blind-pairs/{code}/answer"), &json!({"answer": "first"})).await;
     let preference = service.feedback(study).await.into_iter().find(|row| row.source.as_str() == "subject").unwrap();
     let path = format!("/api/v1/preferences/{}/retract", preference.id);
     let retracted = post(&service, &clinician, &path, &json!({"reason": "wrong person"})).await;
     assert!(retracted.status.is_success(), "{}", retracted.text);
-    let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{token}/retract"), FORM, "").await;
+    let back = send(&service, &rater, &Method::POST, &format!("/rate/pair/{code}/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::SEE_OTHER, "{}", back.text);
     let page = get(&service, &rater, back.headers["location"].to_str().unwrap()).await;
     assert!(page.text.contains("was retracted"), "{}", page.text);

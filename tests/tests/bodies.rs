@@ -73,7 +73,7 @@ async fn device_is_copied_from_another_and_errors_appear_at_their_field() {
 async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
-    let before = service.study(|new| new.trial_budget = 1).await;
+    let before = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(before, &[StudyState::Finished]).await;
     let (page, api) = (format!("/subjects/{subject}/muscles"), format!("/api/v1/subjects/{subject}/muscles"));
     for (typed, expected) in [
@@ -97,7 +97,7 @@ async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     assert_eq!((&muscles["scaled_to_body"], &muscles["sol"]), (&json!(true), &json!({"max_force_n": 4200.0})));
     let shown = service.fetch(&page).await.text;
     assert!(shown.contains("value=\"4200\"") && shown.contains(" checked"), "{shown}");
-    let after = service.study(|new| new.trial_budget = 1).await;
+    let after = service.study(|new| new.number_of_trials = 1).await;
     let of = async |study| service.get(study).await.plan.gait_settings.muscles;
     assert!(of(before).await.is_published());
     assert_eq!(of(after).await.sol.max_force_n, Some(4200.0));
@@ -105,7 +105,7 @@ async fn new_studies_use_the_recorded_muscles_of_their_subject() {
     let clone = service.post(&format!("/api/v1/studies/{before}/clone"), &json!({})).await.json();
     assert!(of(clone["id"].as_str().unwrap().parse().unwrap()).await.is_published());
     assert_eq!(service.put(&api, &json!({})).await.status, StatusCode::OK);
-    let published = service.study(|new| new.trial_budget = 1).await;
+    let published = service.study(|new| new.number_of_trials = 1).await;
     assert!(of(published).await.is_published());
     service.stop().await;
 }

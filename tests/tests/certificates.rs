@@ -7,7 +7,7 @@ use axum::http::StatusCode;
 use gait_optimizer::Mesh;
 use gait_optimizer::export::ControllerFile;
 use gaitwright_service::workers::{GaitCertifier, GaitSolver};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, events};
 use gaitwright_tests::cli;
@@ -40,9 +40,9 @@ fn commands_solve_certify_and_convert_a_gait() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let solve = ["solve", "--muscles", "off", "--mesh", "2,2,3,5", "--certify", "--json", "--out", "gait.json"];
-    let figures: Value = serde_json::from_str(&done(folder, &solve)).unwrap();
-    assert_eq!(figures["status"], "converged");
-    let certificate = &figures["certificate"];
+    let printed: Value = serde_json::from_str(&done(folder, &solve)).unwrap();
+    assert_eq!(printed["status"], "converged");
+    let certificate = &printed["certificate"];
     assert_eq!(certificate["passed"].as_bool(), Some(certificate["failures"].as_array().unwrap().is_empty()));
     assert!(certificate["return_map"]["largest"].as_f64().unwrap() < 1.0);
 
@@ -53,8 +53,12 @@ fn commands_solve_certify_and_convert_a_gait() {
     std::fs::write(folder.join("alone.json"), outcome["gait"].to_string()).unwrap();
     let text = done(folder, &["certify", "alone.json"]);
     assert!(text.starts_with("certificate: ") && text.contains("largest multiplier"), "{text}");
-    let walker = "subject of 1.727 m and 65.7 kg, device \"AMPRO3\", without muscles";
-    assert!(text.contains(walker) && text.contains("differs: settings.mesh.ds2 is 2 (built-in: 4)"), "{text}");
+    let walker = "subject: 1.727 m, 65.7 kg; device: AMPRO3; without muscles";
+    assert!(
+        text.contains(walker)
+            && text.contains("differs from the built-in problem: settings.mesh.ds2 is 2 (built-in: 4)"),
+        "{text}"
+    );
 
     // Figures that the file states are compared with those of its gait.
     for (figure, expected) in [
@@ -79,8 +83,8 @@ fn commands_solve_certify_and_convert_a_gait() {
     // The Gait RMSE of a gait against itself is only the error of interpolation.
     let warm = ["--warm", "gait.json", "--mesh", "2,2,3,5", "--muscles", "off", "--json"];
     let against = [&["solve", "--reference", "own.json"][..], &warm].concat();
-    let figures: Value = serde_json::from_str(&done(folder, &against)).unwrap();
-    assert!(figures["gait_rmse_rad"].as_f64().unwrap() < 0.02, "{}", figures["gait_rmse_rad"]);
+    let printed: Value = serde_json::from_str(&done(folder, &against)).unwrap();
+    assert!(printed["gait_rmse_rad"].as_f64().unwrap() < 0.02, "{}", printed["gait_rmse_rad"]);
 
     let table = done(folder, &["convert", "gait.json", "--to", "csv"]);
     let mut rows = table.lines();
@@ -126,9 +130,9 @@ async fn trial_is_certified_once() {
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
     let study = service
         .study(|new| {
-            new.feedback_mode = FeedbackMode::Human;
+            new.answer_source = AnswerSource::People;
             new.muscles = false;
-            new.trial_budget = 1;
+            new.number_of_trials = 1;
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
         })
         .await;
@@ -168,7 +172,7 @@ async fn trial_is_certified_once() {
     assert_eq!(certificate["passed"].as_bool(), Some(certificate["failures"].as_array().unwrap().is_empty()));
     assert_eq!(service.fetch(&address).await.json(), certificate);
     let audit = service.fetch("/api/v1/audit").await.text;
-    assert_eq!(["ask_certificate", "trial.certify"].map(|act| audit.matches(act).count()), [1, 1], "{audit}");
+    assert_eq!(["request_certificate", "trial.certify"].map(|act| audit.matches(act).count()), [1, 1], "{audit}");
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     let word = if certificate["passed"] == true { ">passed<" } else { ">failed<" };
     assert!(page.contains(word) && page.contains("Largest Poincaré multiplier"), "{page}");
@@ -179,7 +183,7 @@ async fn trial_is_certified_once() {
 async fn one_trial(service: &Service) -> (StudyId, Trial) {
     let study = service
         .study(|new| {
-            (new.muscles, new.trial_budget) = (false, 1);
+            (new.muscles, new.number_of_trials) = (false, 1);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
         })
         .await;
@@ -218,21 +222,23 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     let unknown = recommended().await;
     assert!(unknown["trial_id"] == json!(trial.id) && unknown["execution_report"].is_null(), "{unknown}");
     let before = page().await;
-    assert!(before.contains("No walks with this gait have been simulated yet."), "{before}");
-    for (wrong, field) in
-        [(json!({"walks": 0}), "walks"), (json!({"walks": 1001}), "walks"), (json!({"seed": -1}), "seed")]
-    {
+    assert!(before.contains("No simulated walks with this gait yet."), "{before}");
+    for (wrong, field) in [
+        (json!({"simulated_walks": 0}), "simulated_walks"),
+        (json!({"simulated_walks": 1001}), "simulated_walks"),
+        (json!({"seed": -1}), "seed"),
+    ] {
         let refused = service.post(&address, &wrong).await;
         assert!(refused.status.is_client_error() && refused.text.contains(field), "{}", refused.text);
     }
 
-    let found = simulated(&service, &address, &json!({"walks": 4, "seed": 3})).await;
+    let found = simulated(&service, &address, &json!({"simulated_walks": 4, "seed": 3})).await;
     let report = &found["report"];
     let gait = service.fetch(&format!("/api/v1/trials/{}/gait", trial.id)).await.text;
     std::fs::write(folder.path().join("gait.json"), gait).unwrap();
     let printed = done(folder.path(), &["simulate", "gait.json", "--walks", "4", "--seed", "3", "--json"]);
     assert_eq!(*report, serde_json::from_str::<Value>(&printed).unwrap());
-    let walks: Vec<&Value> = report["grounds"].as_array().unwrap().iter().map(|on| &on["walks"]).collect();
+    let walks: Vec<&Value> = report["grounds"].as_array().unwrap().iter().map(|on| &on["simulated_walks"]).collect();
     assert_eq!(walks, [4, 4, 4]);
 
     // The page has the same without scripts, and the study page and the recommendation follow it.
@@ -249,18 +255,22 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     assert!(of_study.contains(&level) && of_study.contains("#simulated-walks"), "{of_study}");
     assert_eq!(recommended().await["execution_report"], *report);
 
-    // The same walks exist; other walks replace them as the newest report, and the record keeps both.
-    let again = service.post(&address, &json!({"walks": 4, "seed": 3})).await;
+    // The same simulated walks exist; others replace them as the newest report, and the record keeps both.
+    let again = service.post(&address, &json!({"simulated_walks": 4, "seed": 3})).await;
     assert_eq!((again.status, &again.json()["state"]), (StatusCode::OK, &json!("done")));
-    let other = simulated(&service, &address, &json!({"walks": 4, "seed": 4})).await;
+    let other = simulated(&service, &address, &json!({"simulated_walks": 4, "seed": 4})).await;
     assert_eq!((&other["report"]["seed"], other["report"]["grounds"] == report["grounds"]), (&json!(4), false));
     let audit = service.fetch("/api/v1/audit").await.text;
-    assert_eq!(["ask_execution_report", "trial.simulate"].map(|act| audit.matches(act).count()), [2, 2], "{audit}");
+    assert_eq!(
+        ["request_execution_report", "trial.report_execution"].map(|act| audit.matches(act).count()),
+        [2, 2],
+        "{audit}"
+    );
     let events = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
-    let events: Vec<_> = events.iter().filter(|event| event.kind == "gait_simulated").collect();
+    let events: Vec<_> = events.iter().filter(|event| event.kind == "execution_reported").collect();
     assert_eq!((events.len(), &events[0].payload["report"]), (2, report));
     let details = audit_trail(&service).await;
-    assert!(["passed", "failures", "walks"].iter().all(|name| details.contains(*name)), "{details:?}");
+    assert!(["passed", "failures", "simulated_walks"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 
@@ -277,29 +287,29 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
     };
-    let long = json!({"walks": 1000, "seed": 1});
+    let long = json!({"simulated_walks": 1000, "seed": 1});
     assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED);
     until(&service, "running").await;
     let listed = service.fetch("/api/v1/jobs?kind=execution_report").await.items();
     assert_eq!((&listed[0]["trial_id"], listed[0]["progress"].is_number()), (&json!(trial.id), true), "{listed}");
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("1000 walks on each ground with seed 1 are being simulated") && page.contains("<progress"));
-    assert!(page.contains("followed_jobs.mjs") && !page.contains("/simulate\""), "{page}");
-    let other = service.post(&address, &json!({"walks": 2})).await;
+    assert!(page.contains("1000 simulated walks on each ground with seed 1 are running") && page.contains("<progress"));
+    assert!(page.contains("followed_jobs.mjs") && !page.contains("/execution-report\""), "{page}");
+    let other = service.post(&address, &json!({"simulated_walks": 2})).await;
     assert_eq!(other.status, StatusCode::CONFLICT, "{}", other.text);
-    assert!(other.text.contains("1000 walks with seed 1 are already queued or running"), "{}", other.text);
+    assert!(other.text.contains("1000 simulated walks with seed 1 are already queued or running"), "{}", other.text);
     assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED, "the same walks are the same job");
     assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.json()["state"], "cancelled");
     until(&service, "cancelled").await;
     assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
 
-    assert_eq!(service.post(&address, &json!({"walks": 1000, "seed": 2})).await.status, StatusCode::ACCEPTED);
+    assert_eq!(service.post(&address, &json!({"simulated_walks": 1000, "seed": 2})).await.status, StatusCode::ACCEPTED);
     until(&service, "running").await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
     until(&service, "running").await;
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("1000 walks on each ground with seed 2"), "{page}");
+    assert!(page.contains("1000 simulated walks on each ground with seed 2"), "{page}");
     service.post(&format!("{job}/cancel"), &json!({})).await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
@@ -312,7 +322,7 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
 async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
-    let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 2)).await;
+    let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 2)).await;
     for outcome in
         [json!({"outcome": "converged", "gait_rmse_rad": 0.2}), json!({"outcome": "not_converged", "reason": "r"})]
     {
@@ -380,7 +390,7 @@ async fn command_line_repeats_the_solve_of_a_trial_bit_for_bit() {
     let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
     let study = service
         .study(|new| {
-            (new.muscles, new.trial_budget) = (false, 2);
+            (new.muscles, new.number_of_trials) = (false, 2);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
         })
         .await;
@@ -394,11 +404,11 @@ async fn command_line_repeats_the_solve_of_a_trial_bit_for_bit() {
         assert!(problem.headers["content-disposition"].to_str().unwrap().contains(&file));
         assert_eq!(problem.json()["warm_start"].is_object(), trial.warm_started_from.is_some());
         std::fs::write(folder.path().join(&file), &problem.text).unwrap();
-        let figures = done(folder.path(), &["solve", "--problem", &file, "--json"]);
-        let figures: Value = serde_json::from_str(&figures).unwrap();
+        let printed = done(folder.path(), &["solve", "--problem", &file, "--json"]);
+        let printed: Value = serde_json::from_str(&printed).unwrap();
         let report = serde_json::to_value(trial.report.unwrap()).unwrap();
         for same in ["status", "started_from", "iterations", "objective", "gait_rmse_rad", "max_violation"] {
-            assert_eq!(figures[same], report[same], "trial {}: {same}", trial.number);
+            assert_eq!(printed[same], report[same], "trial {}: {same}", trial.number);
         }
         let mut wrong = problem.json();
         wrong["problem"]["subject"]["height_m"] = json!(9.0);

@@ -8,17 +8,17 @@ use axum::body::Body;
 use axum::http::{Request, header};
 use gaitwright_http::openapi;
 use gaitwright_service::access::Role;
-use gaitwright_service::studies::search_space;
+use gaitwright_service::studies::bound_grid;
 use gaitwright_store::audit::{self, ChainCheck};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId, feedback};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::signed_in;
 use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::explained::without_gaits;
-use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::measured::{electromyogram, joint_angles};
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -36,16 +36,16 @@ const ELSEWHERE: [&str; 21] = [
     "last_at",
     "names",
     "network",
+    "number_of_trials",
     "passed",
     "relaxed_bound",
     "scheduled",
     "signed_by",
+    "simulated_walks",
     "to_device",
     "trajectories",
-    "trial_budget",
     "trusted",
     "unchecked_rmse",
-    "walks",
     "without_gait",
 ];
 
@@ -65,11 +65,11 @@ struct Scene {
 impl Scene {
     async fn set(folder: &std::path::Path) -> Self {
         let service = Service::start(&folder.join("a.db"), Analytic::slow(Duration::from_millis(10)), 1).await;
-        let finished = service.study(|new| new.trial_budget = 3).await;
+        let finished = service.study(|new| new.number_of_trials = 3).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
-        let draft = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
-        let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 9)).await;
-        let human = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 4)).await;
+        let draft = service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
+        let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 9)).await;
+        let human = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 4)).await;
         service.wait_for(human, &[StudyState::Waiting]).await;
         Self { service, finished, draft, script, human }
     }
@@ -98,7 +98,7 @@ fn text(value: &Value) -> &str {
 
 /// A level of a6 that is not that of the trial.
 fn elsewhere(trial: &Trial) -> f64 {
-    if search_space::table_i().unwrap().values(trial.action_index)[5] == 0.3 { 0.2 } else { 0.3 }
+    if bound_grid::table_i().unwrap().values(trial.action_index)[5] == 0.3 { 0.2 } else { 0.3 }
 }
 
 #[tokio::test]
@@ -129,7 +129,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
         scene.one(done, &format!("post /studies/{{id}}/{act}"), &format!("{of_draft}/{act}"), body).await;
     }
     service.wait_for(*draft, &[StudyState::Finished]).await;
-    let more = json!({"trial_budget": 4000});
+    let more = json!({"number_of_trials": 4000});
     scene.one(done, "post /studies/{id}/extend", &format!("{of_draft}/extend"), more).await;
     while !service.trials(*draft).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(5)).await;
@@ -180,8 +180,8 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
 
     let next = format!("{api}/studies/{human}/blind-pairs/next");
     let pair = scene.one(done, "post /studies/{id}/blind-pairs/next", &next, json!({})).await;
-    let say = format!("{api}/blind-pairs/{}/answer", text(&pair["pair"]["token"]));
-    scene.one(done, "post /blind-pairs/{token}/answer", &say, json!({"answer": "first"})).await;
+    let say = format!("{api}/blind-pairs/{}/answer", text(&pair["pair"]["code"]));
+    scene.one(done, "post /blind-pairs/{code}/answer", &say, json!({"answer": "first"})).await;
     let unblind = json!({"rater": "not signed in", "reason": "r"});
     scene
         .one(done, "post /studies/{id}/raters/unblind", &format!("{api}/studies/{human}/raters/unblind"), unblind)
@@ -210,7 +210,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let invited = service.post(&format!("{of_finished}/invitations"), &json!({"name": "R7"})).await;
     assert!(invited.status.is_success(), "{}", invited.text);
     let newest = audit::page(&mut service.store.read().await.unwrap(), "", None, 3).await.unwrap();
-    let acts: Vec<_> = newest.iter().map(|row| row.action.as_str()).collect();
+    let acts: Vec<_> = newest.iter().map(|row| row.change.as_str()).collect();
     assert_eq!(acts, ["study.member_add", "user.link", "user.add"]);
     done.insert("post /studies/{id}/invitations".to_owned());
     let token =
@@ -247,19 +247,20 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
         .one(done, "post /lab-sessions/{id}/measurement-files/emg", &format!("{session}/measurement-files/emg"), emg)
         .await;
     scene.one(done, "post /lab-sessions/{id}/emg-results", &format!("{session}/emg-results"), json!({})).await;
-    let motion = json!({"walk": 1, "recording": motion()});
+    let angles = json!({"walk": 1, "recording": joint_angles()});
     scene
         .one(
             done,
-            "post /lab-sessions/{id}/measurement-files/motion",
-            &format!("{session}/measurement-files/motion"),
-            motion,
+            "post /lab-sessions/{id}/measurement-files/joint-angles",
+            &format!("{session}/measurement-files/joint-angles"),
+            angles,
         )
         .await;
     scene.one(done, "post /lab-sessions/{id}/unblind", &format!("{session}/unblind"), json!({"reason": "r"})).await;
     scene.one(done, "post /lab-sessions/{id}/close", &format!("{session}/close"), json!({})).await;
 
-    let no_gait = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits().into()))).await;
+    let no_gait =
+        service.study(|new| (new.number_of_trials, new.search_space) = (1, Some(without_gaits().into()))).await;
     service.wait_for(no_gait, &[StudyState::Finished]).await;
     let explain = format!("{api}/trials/{}/explanation", service.trials(no_gait).await[0].id);
     scene.one(done, "post /trials/{id}/explanation", &explain, json!({})).await;
@@ -294,7 +295,7 @@ fn essence(trials: &[Trial], feedback_rows: &[FeedbackRow]) -> Vec<String> {
         .map(|row| match row.content {
             FeedbackContent::Label { trial, category } => format!("label {category} of {}", number(trial)),
             FeedbackContent::Preference { winner, loser } => format!("{} over {}", number(winner), number(loser)),
-            FeedbackContent::Tie { a, b } => format!("{} as good as {}", number(a), number(b)),
+            FeedbackContent::NoDifference { a, b } => format!("{} as good as {}", number(a), number(b)),
             FeedbackContent::Suggestion { suggested, over } => format!("{suggested:?} over {}", number(over)),
         })
         .collect()
@@ -304,12 +305,12 @@ fn essence(trials: &[Trial], feedback_rows: &[FeedbackRow]) -> Vec<String> {
 async fn form_rest_and_unattended_run_write_the_same_rows_for_the_same_answers() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let automatic = service.study(|new| new.trial_budget = 12).await;
+    let automatic = service.study(|new| new.number_of_trials = 12).await;
     service.wait_for(automatic, &[StudyState::Finished]).await;
     let feedback_rows = service.feedback(automatic).await;
     let expected = essence(&service.trials(automatic).await, &feedback_rows);
     for by_form in [false, true] {
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
         while service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await.state == StudyState::Waiting {
             let trials = service.trials(study).await;
             // Answers as Gait RMSE would: the question is the newest gait against the one the page offers.

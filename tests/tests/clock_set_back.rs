@@ -16,7 +16,7 @@ async fn report_after_a_review_applies_although_the_clock_was_set_back() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, WellFormed::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let trial = trials.iter().find(|trial| trial.state == TrialState::Converged).unwrap().id;

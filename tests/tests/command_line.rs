@@ -27,10 +27,16 @@ fn refused(arguments: &[&str], expected: &str) {
 #[test]
 fn impossible_height_is_refused_with_the_allowed_range() {
     for command in ["tune", "solve"] {
-        refused(&[command, "--height-m", "17.27", "--mass-kg", "65.7"], "--height-m is 17.27; it must be 1.4 to 2.2.");
-        refused(&[command, "--height-m", "1.727", "--mass-kg", "6570"], "--mass-kg is 6570; it must be 35 to 160.");
-        refused(&[command, "--height-m", "NaN", "--mass-kg", "65"], "--height-m is NaN;");
-        refused(&[command, "--height-m", "1.727"], "--mass-kg");
+        refused(
+            &[command, "--height-m", "17.27", "--body-mass-kg", "65.7"],
+            "--height-m is 17.27; it must be 1.4 to 2.2.",
+        );
+        refused(
+            &[command, "--height-m", "1.727", "--body-mass-kg", "6570"],
+            "--body-mass-kg is 6570; it must be 35 to 160.",
+        );
+        refused(&[command, "--height-m", "NaN", "--body-mass-kg", "65"], "--height-m is NaN;");
+        refused(&[command, "--height-m", "1.727"], "--body-mass-kg");
     }
 }
 
@@ -38,7 +44,7 @@ fn impossible_height_is_refused_with_the_allowed_range() {
 fn unknown_subject_is_refused_with_the_known_ones() {
     refused(&["tune", "--subject", "3"], "--subject is \"3\"; it must be 1 or 2, the subjects from the paper.");
     refused(&["solve", "--subject", "0"], "it must be 1 or 2");
-    refused(&["tune", "--subject", "1", "--height-m", "1.7", "--mass-kg", "70"], "cannot be used with");
+    refused(&["tune", "--subject", "1", "--height-m", "1.7", "--body-mass-kg", "70"], "cannot be used with");
 }
 
 #[test]
@@ -56,7 +62,7 @@ fn malformed_bounds_are_refused_by_name() {
 fn other_invalid_arguments_are_refused() {
     for command in ["tune", "solve"] {
         refused(&[command, "--subject", "-1"], "must be 1 or 2");
-        refused(&[command, "--height-m", "-1.7", "--mass-kg", "65"], "--height-m is -1.7; it must be 1.4 to 2.2.");
+        refused(&[command, "--height-m", "-1.7", "--body-mass-kg", "65"], "--height-m is -1.7; it must be 1.4 to 2.2.");
     }
     for number in ["0", "-1", "10001", "many"] {
         refused(&["tune", "--trials", number], "'--trials <NUMBER>': must be a whole number from 1 to 10000");
@@ -83,7 +89,7 @@ fn other_invalid_arguments_are_refused() {
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["simulate", "nowhere.json", "--walks", "0"], "must be a whole number from 1 to 100000");
     refused(&["simulate", "nowhere.json", "--ground", "-5"], "'--ground <MILLIMETRES>': must be a number from 0 to 50");
-    refused(&["solve", "--height-m", "tall", "--mass-kg", "65"], "'--height-m <METRES>': must be a number");
+    refused(&["solve", "--height-m", "tall", "--body-mass-kg", "65"], "'--height-m <METRES>': must be a number");
     refused(&["emg", "nowhere.csv", "--order", "high"], "must be 2, 4, 6 or 8");
     refused(&["solve", "--warm", "nowhere.json", "--warm-local-optimum", "first"], "must be a whole number");
     refused(&["prune", "--older-than-days", "0"], "must be a whole number from 1 to 36500");

@@ -6,12 +6,12 @@ use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gaitwright_http::openapi;
 use gaitwright_store::audit;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::cli;
 use gaitwright_tests::consistent_gaits::Consistent;
-use gaitwright_tests::measured::motion;
+use gaitwright_tests::measured::joint_angles;
 use gaitwright_tests::service::Service;
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -45,17 +45,17 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
     let person = service.subject().await;
-    let finished = service.study(|new| new.trial_budget = 3).await;
+    let finished = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(finished, &[StudyState::Finished]).await;
     let draft = service.study(|new| new.start = false).await;
-    let human = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let human = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{human}/blind-pairs/next"), &json!({})).await.json();
-    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
-    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    let code = pair["pair"]["code"].as_str().unwrap().to_owned();
+    let script = service.study(|new| (new.number_of_trials, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     // One is open at any instant.
-    let running = service.study(|new| (new.trial_budget, new.parallel_trials) = (300, 2)).await;
+    let running = service.study(|new| (new.number_of_trials, new.parallel_trials) = (300, 2)).await;
     while !service.trials(running).await.iter().any(|trial| trial.state.is_open()) {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
@@ -70,8 +70,9 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let session = service.post(&format!("/api/v1/studies/{finished}/lab-sessions"), &gaits).await.json();
     let session = session["id"].as_str().unwrap().to_owned();
     service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
-    let measured = json!({"walk": 1, "recording": motion()});
-    let recording = service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured).await;
+    let measured = json!({"walk": 1, "recording": joint_angles()});
+    let recording =
+        service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/joint-angles"), &measured).await;
     assert_eq!(recording.status, StatusCode::CREATED, "{}", recording.text);
     let assessment = json!({"trial_a": converged[0].id, "trial_b": converged[1].id, "answer": "cannot_tell"});
     let assessment = service.post(&format!("/api/v1/studies/{finished}/assessments"), &assessment).await.json();
@@ -86,7 +87,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
     let withdrawn = service.post(&format!("{of_subject}/withdraw"), &withdraw).await;
     assert_eq!(withdrawn.status, StatusCode::OK, "{}", withdrawn.text);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    assert_eq!((trail.len(), trail[0].action.as_str()), (before + 1, "subject.withdraw"));
+    assert_eq!((trail.len(), trail[0].change.as_str()), (before + 1, "subject.withdraw"));
     assert_eq!(trail[0].detail["stopped"].as_array().unwrap().len(), 4);
     assert_eq!(service.post(&format!("{of_subject}/withdraw"), &withdraw).await.status, StatusCode::CONFLICT);
     for study in [draft, human, script, running] {
@@ -106,12 +107,12 @@ async fn withdrawal_stops_all_writes_and_exports() {
     for (path, body) in [
         ("/api/v1/studies".to_owned(), json!({"subject_id": person})),
         (format!("/api/v1/studies/{finished}/clone"), json!({})),
-        (format!("/api/v1/studies/{running}/extend"), json!({"trial_budget": 310})),
+        (format!("/api/v1/studies/{running}/extend"), json!({"number_of_trials": 310})),
         (format!("/api/v1/studies/{finished}/preferences"), answer),
         (format!("/api/v1/studies/{finished}/suggestions"), suggestion),
         (format!("/api/v1/studies/{script}/ask"), json!({})),
         (format!("/api/v1/studies/{human}/blind-pairs/next"), json!({})),
-        (format!("/api/v1/blind-pairs/{token}/answer"), json!({"answer": "first"})),
+        (format!("/api/v1/blind-pairs/{code}/answer"), json!({"answer": "first"})),
         (format!("/api/v1/trials/{cancelled}/retry"), json!({})),
         (format!("/api/v1/studies/{finished}/lab-sessions"), gaits),
         (format!("/api/v1/lab-sessions/{session}/walks"), json!({"walk": 2})),
@@ -152,7 +153,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         ("/jobs/{id}", format!("solve-{}", trials[0].id)),
         ("/preferences/{id}", preference.to_string()),
         ("/assessments/{id}", assessment.clone()),
-        ("/blind-pairs/{token}", token.clone()),
+        ("/blind-pairs/{code}", code.clone()),
         ("/lab-sessions/{id}", session.clone()),
         ("/measurement-files/{id}", recording.json()["id"].as_str().unwrap().to_owned()),
         ("/study-comparison", format!("study-comparison?ids={finished},{running}")),
@@ -201,7 +202,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         format!("/studies/{finished}/live"),
         format!("/studies/{finished}/compare"),
         format!("/trials/{}", trials[0].id),
-        format!("/rate/pair/{token}"),
+        format!("/rate/pair/{code}"),
         format!("/studies/{finished}/lab"),
         format!("/studies/{finished}/figures"),
         format!("/lab-sessions/{session}"),
@@ -233,7 +234,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
 async fn subject_page_records_and_withdraws_consent() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(20)), 1).await;
-    let running = service.study(|new| new.trial_budget = 50).await;
+    let running = service.study(|new| new.number_of_trials = 50).await;
     let page = format!("/subjects/{}", service.subject().await);
     let list = service.fetch("/subjects").await;
     assert!(list.text.contains(&page) && list.text.contains("not on record"), "{}", list.text);
@@ -264,7 +265,7 @@ async fn subject_page_records_and_withdraws_consent() {
     assert!(!shown.contains("/withdraw\""), "it cannot be done twice");
     assert_eq!(send("withdraw", "reason=again&confirmed=yes").await.status, StatusCode::CONFLICT);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 10).await.unwrap();
-    let acts: Vec<_> = trail.iter().map(|row| row.action.as_str()).take(2).collect();
+    let acts: Vec<_> = trail.iter().map(|row| row.change.as_str()).take(2).collect();
     assert_eq!(acts, ["subject.withdraw", "subject.consent"]);
     service.stop().await;
 }
@@ -277,7 +278,7 @@ async fn studies_of_a_withdrawn_subject_cannot_be_exported_or_imported() {
     let mut archives = Vec::new();
     let mut last = None;
     for seed in [1, 2] {
-        let study = service.study(|new| (new.seed, new.trial_budget) = (seed, 2)).await;
+        let study = service.study(|new| (new.seed, new.number_of_trials) = (seed, 2)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         archives.push(exported(&service.store, study).await);
         last = Some(study);
@@ -309,9 +310,9 @@ async fn studies_of_a_withdrawn_subject_cannot_be_exported_or_imported() {
 async fn saved_responses_of_repeated_requests_are_withheld_after_withdrawal() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let finished = service.study(|new| new.trial_budget = 3).await;
+    let finished = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(finished, &[StudyState::Finished]).await;
-    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    let script = service.study(|new| (new.number_of_trials, new.evaluation) = (3, Evaluation::Script)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     let trials = service.trials(finished).await;
     let told = (

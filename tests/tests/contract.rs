@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::certified_best::BestCertification;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::summary;
@@ -35,13 +35,13 @@ async fn documents_keep_their_shape() {
         1,
     )
     .await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     let present = service.wait_for(study, &[StudyState::Finished]).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
 
     // tune --json; the last trial comes first, because it has everything.
     let there = snapshot.clone();
-    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &there, &Beliefs::default())).await;
+    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &there, &Analyses::default())).await;
     let best = rank.unwrap().unwrap().first().copied();
     let mut tune = serde_json::to_value(summary::of(&snapshot, best, BestCertification::default())).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -45,7 +45,7 @@ fn begins_formula(cell: &str) -> bool {
 async fn csv_endpoints_return_no_formulas() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let good: Vec<_> = trials.iter().filter(|t| t.state.as_str() == "converged").map(|t| t.id).collect();
@@ -117,7 +117,7 @@ async fn csv_endpoints_return_no_formulas() {
 async fn history_has_a_row_for_each_iteration_of_parallel_trials() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 3).await;
-    let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (14, 3)).await;
+    let study = service.study(|new| (new.number_of_trials, new.parallel_trials) = (14, 3)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let text = service.fetch(&format!("/api/v1/studies/{study}/history.csv")).await.text;
     let iterations: Vec<u32> =

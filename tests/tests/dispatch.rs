@@ -109,7 +109,7 @@ impl Drop for Rig {
 }
 
 async fn started(service: &Service) -> StudyId {
-    service.study(|new| (new.seed, new.trial_budget) = (3, TRIALS)).await
+    service.study(|new| (new.seed, new.number_of_trials) = (3, TRIALS)).await
 }
 
 async fn wait_for_a_solve(service: &Service, study: StudyId) {

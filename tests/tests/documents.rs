@@ -76,11 +76,11 @@ async fn served_documents_have_exactly_the_described_properties() {
     let solver = filled(&described.component("SolveOptions")["properties"]["solver"]);
     let nearest = json!({"nearest_to_reference": {"within_percent": 5}});
     let with_muscles = json!({
-        "subject_id": subject, "trial_budget": 2, "muscles": true,
+        "subject_id": subject, "number_of_trials": 2, "muscles": true,
         "gait_settings": {"naturalness": {"reference_weight": 1, "trailing_load_share": 0.1}},
         "solve_options": {"solver": solver, "time_limit_s": 60, "local_optimum_choice": nearest},
     });
-    for study in [with_muscles, json!({"subject_id": subject, "trial_budget": 2, "muscles": false})] {
+    for study in [with_muscles, json!({"subject_id": subject, "number_of_trials": 2, "muscles": false})] {
         let made = service.post("/api/v1/studies", &study).await;
         assert!(made.status.is_success(), "{}", made.text);
         let id = made.json()["id"].as_str().unwrap().parse().unwrap();

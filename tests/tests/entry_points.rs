@@ -10,7 +10,7 @@ use axum::http::StatusCode;
 use gaitwright_http::openapi;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::feedback::Source;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{StudyId, TrialId, blind_pairs, commit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
@@ -82,7 +82,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
     Some(match operation {
         "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => EntryPoint::Preference,
         "post /api/v1/studies/{id}/assessments" => EntryPoint::Note,
-        "post /api/v1/blind-pairs/{token}/answer" | "post /rate/pair/{token}" => EntryPoint::RaterAnswer,
+        "post /api/v1/blind-pairs/{code}/answer" | "post /rate/pair/{code}" => EntryPoint::RaterAnswer,
         "post /api/v1/studies/{id}/blind-pairs/next" | "post /rate/{id}" => EntryPoint::RaterPair,
         "post /api/v1/studies/{id}/lab-sessions" | "post /studies/{id}/lab" => EntryPoint::Plan,
         "post /api/v1/lab-sessions/{id}/walks" | "post /lab/{id}" => EntryPoint::Walk,
@@ -104,9 +104,9 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
         | "post /studies/{id}/retract"
         | "post /api/v1/lab-sessions/{id}/retract-answer"
         | "post /lab/{id}/retract"
-        | "post /rate/pair/{token}/retract" => RETRACTS,
+        | "post /rate/pair/{code}/retract" => RETRACTS,
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
-            EntryPoint::None("the lab evaluates a trial by itself; figures, and no person's answer")
+            EntryPoint::None("the lab evaluates a trial by itself; values, and no person's answer")
         }
         _ if operation.starts_with("get ") => return reads(operation),
         _ if [
@@ -115,7 +115,6 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
             "/explanation",
             "/execution-report",
             "/relaxed-trial",
-            "/simulate",
             "/cancel",
             "/retry",
             "/emg-results",
@@ -173,13 +172,13 @@ impl Scene {
     async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (24, FeedbackMode::Mixed)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (24, AnswerSource::Both)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trials = service.trials(study).await;
         let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let without_gait = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap().id;
         let (first, second) = (converged[0], converged[1]);
-        // The same figures to the last bit: what a bound gives that no gait comes near.
+        // The same values to the last bit: what a bound gives that no gait comes near.
         let equal = converged[2].id;
         let scene = Self { _folder: folder, service, study, pair: (first.id, second.id), without_gait, equal };
         let report = serde_json::to_string(first.report.as_ref().unwrap()).unwrap();
@@ -349,7 +348,7 @@ const COMMANDS: [(&str, &str); 25] = [
     ("signing-key", "makes a key to sign archives"),
     ("audit", "reads the record"),
     ("backup", "copies the record"),
-    ("body", "prints the figures of a body"),
+    ("body", "prints the values of a body"),
     ("certify", "certifies a gait file"),
     ("config", "shows settings"),
     ("doctor", "checks machine, settings and record, and changes nothing"),
@@ -452,20 +451,16 @@ async fn pair_cannot_be_answered_after_a_rule_excludes_it() {
         (Rule::Withdrawal, [StatusCode::CONFLICT, StatusCode::CONFLICT]),
     ] {
         let scene = Rated::new().await;
-        let token = scene.token().await;
+        let code = scene.code().await;
         scene.close(rule).await;
         let before = scene.service.feedback(scene.study).await.len();
-        let answer = format!("/api/v1/blind-pairs/{token}/answer");
+        let answer = format!("/api/v1/blind-pairs/{code}/answer");
         let refused = scene.service.post(&answer, &json!({"answer": "first"})).await;
         assert_eq!(refused.status, statuses[0], "{rule:?}: {}", refused.text);
         assert_eq!(scene.service.feedback(scene.study).await.len(), before, "{rule:?}");
         let next = scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await;
         assert_eq!(next.status, statuses[1], "{rule:?}: {}", next.text);
-        assert!(
-            next.status != StatusCode::OK || next.json()["pair"]["token"] != json!(token),
-            "{rule:?}: {}",
-            next.text
-        );
+        assert!(next.status != StatusCode::OK || next.json()["pair"]["code"] != json!(code), "{rule:?}: {}", next.text);
         scene.service.stop().await;
     }
 }
@@ -481,15 +476,15 @@ impl Rated {
     async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
         service.wait_for(study, &[StudyState::Waiting]).await;
         Self { _folder: folder, service, study }
     }
 
-    async fn token(&self) -> String {
+    async fn code(&self) -> String {
         let next =
             self.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", self.study), &json!({})).await.json();
-        next["pair"]["token"].as_str().unwrap().to_owned()
+        next["pair"]["code"].as_str().unwrap().to_owned()
     }
 
     async fn close(&self, rule: Rule) {
@@ -525,10 +520,10 @@ impl Rated {
 async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
     for blind_first in [true, false] {
         let scene = Rated::new().await;
-        let token = scene.token().await;
+        let code = scene.code().await;
         let shown = blind_pairs::of_study(&mut scene.service.store.read().await.unwrap(), scene.study).await.unwrap();
         let (a, b) = shown[0].trials();
-        let blind = format!("/api/v1/blind-pairs/{token}/answer");
+        let blind = format!("/api/v1/blind-pairs/{code}/answer");
         let open = format!("/api/v1/studies/{}/preferences", scene.study);
         let (said, chosen) = (json!({"answer": "first"}), json!({"trial_a": b, "trial_b": a, "answer": "a"}));
         let (first, second) =
@@ -563,7 +558,7 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
         assert_eq!(of_people(rows_before), 0, "blind first: {blind_first}");
         let next =
             scene.service.post(&format!("/api/v1/studies/{}/blind-pairs/next", scene.study), &json!({})).await.json();
-        assert_ne!(next["pair"]["token"], json!(token), "the pair is not shown again");
+        assert_ne!(next["pair"]["code"], json!(code), "the pair is not shown again");
         scene.service.stop().await;
     }
 }
@@ -660,10 +655,10 @@ impl Plan {
 #[tokio::test]
 async fn plan_made_before_an_answer_is_not_written() {
     let scene = Rated::new().await;
-    let token = scene.token().await;
+    let code = scene.code().await;
     let plan = Plan::of(&scene).await;
     assert!(plan.is_written(&scene).await);
-    let answer = format!("/api/v1/blind-pairs/{token}/answer");
+    let answer = format!("/api/v1/blind-pairs/{code}/answer");
     let answered = scene.service.post(&answer, &json!({"answer": "first"})).await;
     assert!(answered.status.is_success(), "{}", answered.text);
     assert!(!plan.is_written(&scene).await);

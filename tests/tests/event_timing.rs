@@ -59,18 +59,18 @@ fn masked(event: &str) -> String {
         .collect()
 }
 
-/// Guesses by whether a figure is above the middle of all of them.
-fn right_guesses(figures: &[Duration], truth: &[bool]) -> usize {
-    let mut sorted = figures.to_vec();
+/// Guesses by whether a duration is above the middle of all of them.
+fn right_guesses(durations: &[Duration], truth: &[bool]) -> usize {
+    let mut sorted = durations.to_vec();
     sorted.sort();
-    let middle = sorted[figures.len() / 2];
-    figures.iter().zip(truth).filter(|(figure, first)| (**figure >= middle) == **first).count()
+    let middle = sorted[durations.len() / 2];
+    durations.iter().zip(truth).filter(|(duration, first)| (**duration >= middle) == **first).count()
 }
 
 #[tokio::test]
 async fn event_streams_reveal_no_allocation_by_content_or_timing() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits = service.trials(study).await;
     gaits.retain(|trial| trial.state == TrialState::Converged);
@@ -108,8 +108,8 @@ async fn event_streams_reveal_no_allocation_by_content_or_timing() {
     assert_eq!(looks.len(), 1, "{looks:#?}");
     // Five standard deviations, which chance exceeds less than once in a million.
     let limit = 2.5 * (SESSIONS as f64).sqrt();
-    for (what, figures) in [("event", &until_event), ("answer", &until_answer), ("walks", &walks)] {
-        let right = right_guesses(figures, &truth);
+    for (what, durations) in [("event", &until_event), ("answer", &until_answer), ("walks", &walks)] {
+        let right = right_guesses(durations, &truth);
         println!("by the time until the {what}: {right} of {SESSIONS} orders guessed");
         assert!(right.abs_diff(SESSIONS / 2) as f64 <= limit, "{what}: {right} of {SESSIONS}");
     }

@@ -57,7 +57,7 @@ async fn explained(service: &Service, trial: TrialId) -> Value {
 /// The trials that the service explained, in order.
 async fn explained_in_order(service: &Service) -> Vec<String> {
     let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    trail.retain(|row| row.action == "trial.explain" && row.actor == Actor::program().as_str());
+    trail.retain(|row| row.change == "trial.explain" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }
 
@@ -66,7 +66,8 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let explainer = Clearance::slow(Duration::from_millis(100));
     let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (8, Some(with_few_gaits().into()))).await;
+    let study =
+        service.study(|new| (new.number_of_trials, new.search_space) = (8, Some(with_few_gaits().into()))).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = without_gait(&service, study).await;
     assert!(trials.len() > 2);
@@ -75,7 +76,7 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let coming = service.fetch(&format!("/api/v1/jobs/explanation-{}", last.id)).await;
     assert_eq!(coming.json()["state"], "queued", "{}", coming.text);
     let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
-    assert!(page.contains("is queued behind those of other trials") && page.contains("/explain\""), "{page}");
+    assert!(page.contains("The explanation of this trial is queued") && page.contains("/explain\""), "{page}");
 
     let found = explained(&service, last.id).await;
     let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();
@@ -97,8 +98,10 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     assert!(!page.contains("/explain\""), "there is nothing to ask for any more");
 
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    let reason =
-        format!("In {0} of {0} explained trials, relaxing a5 (swing-foot clearance) alone gives a gait", trials.len());
+    let reason = format!(
+        "In {0} of the {0} trials with an explanation, relaxing a5 (swing-foot clearance) alone gives a gait",
+        trials.len()
+    );
     assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");
     service.stop().await;
 }
@@ -109,7 +112,8 @@ async fn repeated_requests_give_one_explanation() {
     let (explainer, solver) = (Clearance::default(), Analytic::slow(Duration::from_millis(20)));
     let counts = explainer.counts.clone();
     let service = Service::start_explaining(&folder.path().join("a.db"), solver, explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(with_few_gaits().into()))).await;
+    let study =
+        service.study(|new| (new.number_of_trials, new.search_space) = (9, Some(with_few_gaits().into()))).await;
     until("a trial has no gait", async || !without_gait(&service, study).await.is_empty()).await;
     let trial = without_gait(&service, study).await[0].id;
     assert_eq!(service.fetch(&address(trial)).await.status, StatusCode::NOT_FOUND, "nobody asked");
@@ -130,7 +134,7 @@ async fn repeated_requests_give_one_explanation() {
     assert_eq!(keyed().await.status, StatusCode::ACCEPTED, "the same request has the same answer");
     assert_eq!(counts.begun.load(Ordering::SeqCst), 1);
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    assert_eq!(trail.iter().filter(|row| row.action == "trial.ask_explanation").count(), 1);
+    assert_eq!(trail.iter().filter(|row| row.change == "trial.request_explanation").count(), 1);
     let told = events::after(&mut service.store.read().await.unwrap(), study, 0, 1000).await.unwrap();
     let told: Vec<_> = told.iter().filter(|event| event.kind == "trial_explained").collect();
     assert_eq!((told.len(), &told[0].payload["relaxed_bound"]), (1, &json!("a5")));
@@ -144,9 +148,9 @@ async fn study_without_failed_solves_is_not_explained() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 1)).await;
+    let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 1)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     let told: TrialId = asked["id"].as_str().unwrap().parse().unwrap();
     let outcome = json!({"outcome": "not_converged", "reason": "the foot scuffed"});
@@ -174,7 +178,7 @@ async fn requested_explanation_is_made_after_a_restart() {
     let counts = explainer.counts.clone();
     let solver = Analytic::slow(Duration::from_millis(5));
     let service = Service::start_explaining(&database, solver, explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (9, Some(without_gaits().into()))).await;
+    let study = service.study(|new| (new.number_of_trials, new.search_space) = (9, Some(without_gaits().into()))).await;
     service.wait_for_trials(study, 2).await;
     service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
     let trials = without_gait(&service, study).await;
@@ -205,7 +209,7 @@ async fn withdrawal_stops_explanations() {
     let explainer = Clearance::slow(FOR_EVER);
     let counts = explainer.counts.clone();
     let service = Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
+    let study = service.study(|new| (new.number_of_trials, new.search_space) = (3, Some(without_gaits().into()))).await;
     until("one is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
     let withdraw = format!("/api/v1/subjects/{}/withdraw", service.subject().await);
     assert_eq!(service.post(&withdraw, &json!({"reason": "moved away"})).await.status, StatusCode::OK);
@@ -226,7 +230,7 @@ async fn refused_explanation_states_its_reason_and_is_not_retried() {
     let explainer = Clearance { panics: true, ..Clearance::default() };
     let counts = explainer.counts.clone();
     let service = Service::start_explaining(&database, Analytic::default(), explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits().into()))).await;
+    let study = service.study(|new| (new.number_of_trials, new.search_space) = (2, Some(without_gaits().into()))).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await[1].id;
     until("it is refused", async || service.fetch(&address(trial)).await.status == StatusCode::CONFLICT).await;
@@ -260,7 +264,8 @@ async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
     let folder = tempfile::tempdir().unwrap();
     let service =
         Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), Clearance::default()).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (2, Some(with_few_gaits().into()))).await;
+    let study =
+        service.study(|new| (new.number_of_trials, new.search_space) = (2, Some(with_few_gaits().into()))).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = without_gait(&service, study).await.remove(0);
     explained(&service, trial.id).await;
@@ -275,20 +280,20 @@ async fn relaxation_within_the_search_space_is_tried_in_the_same_study() {
     assert_eq!((made.status, refused.status), (StatusCode::SEE_OTHER, StatusCode::CONFLICT), "{}", refused.text);
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
-    assert_eq!((trials.len(), service.get(study).await.plan.trial_budget), (3, 3));
+    assert_eq!((trials.len(), service.get(study).await.plan.number_of_trials), (3, 3));
     let relaxed = &trials[2];
     assert_eq!(made.headers["location"].to_str().unwrap(), format!("/trials/{}", relaxed.id));
     let expected = TunedBounds { a5: 0.02, ..trial.action };
     assert_eq!((relaxed.action, relaxed.state), (expected, TrialState::Converged));
     assert_eq!(relaxed.reason, format!("requested by a person: trial {} with a5 relaxed", trial.number));
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    let rows: Vec<_> = trail.iter().filter(|row| row.action == "trial.relax").collect();
+    let rows: Vec<_> = trail.iter().filter(|row| row.change == "trial.relax").collect();
     assert_eq!(rows.iter().map(|row| row.object.clone()).collect::<Vec<_>>(), [format!("trial {}", relaxed.id)]);
 
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
     assert!(page.contains(">trial 3</a> already has these bounds") && !page.contains("/relaxed-trial"), "{page}");
     let details = audit_trail(&service).await;
-    assert!(["trial_budget", "without_gait"].iter().all(|name| details.contains(*name)), "{details:?}");
+    assert!(["number_of_trials", "without_gait"].iter().all(|name| details.contains(*name)), "{details:?}");
     service.stop().await;
 }
 
@@ -297,7 +302,7 @@ async fn relaxation_outside_the_search_space_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let service =
         Service::start_explaining(&folder.path().join("a.db"), Analytic::default(), Clearance::default()).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (1, Some(without_gaits().into()))).await;
+    let study = service.study(|new| (new.number_of_trials, new.search_space) = (1, Some(without_gaits().into()))).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0).id;
     explained(&service, trial).await;
@@ -324,7 +329,7 @@ async fn service_and_command_line_give_the_same_explanation() {
             .await;
     let study = service
         .study(|new| {
-            (new.muscles, new.trial_budget) = (false, 1);
+            (new.muscles, new.number_of_trials) = (false, 1);
             new.gait_settings.mesh = Mesh { ds2: 2, ds3: 2, ss2: 3, ss1: 5 };
             (new.solve_options.retry, new.solve_options.initial_guesses) = (false, 1);
             new.base_bounds = TunedBounds { a2: 10.0, ..TunedBounds::default() };

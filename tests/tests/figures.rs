@@ -7,7 +7,7 @@ use axum::http::{Request, StatusCode};
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::measured::{electromyogram, four_strides, motion};
+use gaitwright_tests::measured::{electromyogram, four_strides, joint_angles};
 use gaitwright_tests::service::Service;
 use http_body_util::BodyExt;
 use serde_json::json;
@@ -37,7 +37,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let mut studies = Vec::new();
     for muscles in [true, false] {
-        let study = service.study(|new| (new.trial_budget, new.muscles) = (6, muscles)).await;
+        let study = service.study(|new| (new.number_of_trials, new.muscles) = (6, muscles)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         studies.push(study);
     }
@@ -52,7 +52,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     for (what, body) in [
         ("measurement-files/emg", emg),
         ("emg-results", json!({})),
-        ("measurement-files/motion", json!({"walk": 1, "recording": motion()})),
+        ("measurement-files/joint-angles", json!({"walk": 1, "recording": joint_angles()})),
     ] {
         let done = service.post(&format!("{api}/{what}"), &body).await;
         assert!(done.status.is_success(), "{}", done.text);
@@ -64,7 +64,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
         (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 5 + 2 + 7),
         (format!("/trials/{}", gaits[0].id), 1 + 1 + 4 + 2 + 3 + 3 + 7 + 7 + 2 + 4 + 1),
         (format!("/lab-sessions/{session}"), 6 + 2),
-        (format!("/studies/{}/belief?x=a5&y=a6", studies[0]), 8 + 2 + 2 + 1),
+        (format!("/studies/{}/analysis?x=a5&y=a6", studies[0]), 8 + 2 + 2 + 1),
         (format!("/reference-gaits/{}", service.reference().await), 5),
     ] {
         let shown = service.fetch(&page).await;
@@ -132,7 +132,7 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
     let one_stride = service.post("/api/v1/reference-gaits", &one_stride).await.json();
     let one_stride = one_stride["id"].as_str().unwrap().parse().unwrap();
     for (reference, band) in [(one_stride, false), (imported, true)] {
-        let study = service.study(|new| (new.trial_budget, new.reference_gait_id) = (2, Some(reference))).await;
+        let study = service.study(|new| (new.number_of_trials, new.reference_gait_id) = (2, Some(reference))).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trial = service.trials(study).await.into_iter().find(|t| t.state == TrialState::Converged).unwrap().id;
         // The page of a gait has one legend for the left and the right leg.
@@ -166,7 +166,7 @@ async fn chart_of_a_running_solve_remains_after_its_end() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(std::time::Duration::from_millis(60));
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     let page = format!("/studies/{study}");
     let mut drawings = Vec::new();
     while drawings.is_empty() {

@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Method, Request, StatusCode};
 use gaitwright_service::access::Role;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId};
 use gaitwright_tests::analytic::Analytic;
@@ -26,7 +26,7 @@ async fn service() -> (TempDir, Service) {
 
 /// A finished study and two of its converged trials.
 async fn finished(service: &Service) -> (StudyId, TrialId, TrialId) {
-    let study = service.study(|new| new.trial_budget = 5).await;
+    let study = service.study(|new| new.number_of_trials = 5).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let mut converged = trials.iter().filter(|t| t.state == TrialState::Converged).map(|t| t.id);
@@ -130,8 +130,8 @@ async fn study_form_checks_every_field() {
             ("height_m", ""),
             ("body_mass_kg", ""),
             ("muscles", "off"),
-            ("feedback_mode", "automatic"),
-            ("trial_budget", "2"),
+            ("answer_source", "gait_rmse"),
+            ("number_of_trials", "2"),
             ("parallel_trials", "1"),
             ("seed", "1"),
             ("name", ""),
@@ -147,8 +147,8 @@ async fn study_form_checks_every_field() {
     for (field, value, says) in [
         ("muscles", "maybe", "must be on or off"),
         ("muscles", "", "must be on or off"),
-        ("feedback_mode", "both", "it must be automatic, human or mixed"),
-        ("trial_budget", "-1", "it must be 1 to 10000"),
+        ("answer_source", "mixed", "it must be gait_rmse, people or both"),
+        ("number_of_trials", "-1", "it must be 1 to 10000"),
         ("parallel_trials", "1.5", "it must be 1 to 64"),
         ("seed", "-1", "it must be 0 to 9007199254740991"),
         (
@@ -237,7 +237,7 @@ async fn change_shows_its_own_comparison_and_replaces_the_answer() {
 #[tokio::test]
 async fn finished_study_waits_for_no_answer_after_a_retraction() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let converged: Vec<_> =
         service.trials(study).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -365,7 +365,7 @@ async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
 #[tokio::test]
 async fn study_without_answers_has_no_best_action() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("No answers yet") && !page.contains("best action so far") && !page.contains(">best<"));
@@ -383,7 +383,7 @@ async fn cancelled_trial_does_not_count_as_progress() {
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(Duration::from_millis(20));
     let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for_trials(study, 1).await;
     while !service.trials(study).await.iter().any(|trial| trial.number == 2 && trial.state == TrialState::Running) {
         tokio::time::sleep(Duration::from_millis(5)).await;
@@ -403,8 +403,8 @@ async fn cancelled_trial_does_not_count_as_progress() {
 async fn best_line_starts_at_the_first_gait_with_parallel_trials() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(2)), 3).await;
-    for budget in [3, 9] {
-        let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (budget, 3)).await;
+    for number in [3, 9] {
+        let study = service.study(|new| (new.number_of_trials, new.parallel_trials) = (number, 3)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let history = service.fetch(&format!("/api/v1/studies/{study}/history")).await.items();
         let history = history.as_array().unwrap();
@@ -422,7 +422,7 @@ async fn best_line_starts_at_the_first_gait_with_parallel_trials() {
         let first = order.iter().position(|id| state(id) == TrialState::Converged).unwrap();
         let begins = history.iter().find(|milestone| milestone["gait_rmse_rad"].is_number()).unwrap();
         assert_eq!((&begins["iteration"], &begins["trial_id"]), (&json!(first + 1), &json!(order[first])));
-        assert_eq!(history.last().unwrap()["iteration"], json!(budget));
+        assert_eq!(history.last().unwrap()["iteration"], json!(number));
         let iterations: Vec<_> = history.iter().map(|milestone| milestone["iteration"].as_u64()).collect();
         assert!(iterations.is_sorted_by(|a, b| a < b), "{iterations:?}");
         // The best trial after some results is one of these results.
@@ -472,16 +472,16 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
     let subject = service.subject().await;
     let form = |changed: &str| {
         let given = format!("{changed}&");
-        let rest = ["trial_budget=3", "seed=1", "tuned_a1=on", "values_a1=15,20", "tuned_a3=on"];
+        let rest = ["number_of_trials=3", "seed=1", "tuned_a1=on", "values_a1=15,20", "tuned_a3=on"];
         let rest: Vec<&str> =
             rest.into_iter().filter(|field| !given.starts_with(field.split_once('=').unwrap().0)).collect();
-        format!("{changed}&subject={subject}&muscles=on&feedback_mode=automatic&parallel_trials=1&{}", rest.join("&"))
+        format!("{changed}&subject={subject}&muscles=on&answer_source=gait_rmse&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
         ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be 0.05 to 50000"),
         ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0; it must be 0.001 to 2000"),
         ("values_a1=15,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
-        ("trial_budget=many", "trial_budget", "\u{201c}Trials\u{201d} is "),
+        ("number_of_trials=many", "number_of_trials", "\u{201c}Number of trials\u{201d} is "),
         ("seed=x", "seed", "\u{201c}Seed\u{201d} is "),
         ("height_m=1.7", "height_m", "\u{201c}Height, m\u{201d} is "),
     ] {
@@ -517,7 +517,7 @@ async fn new_study_of_a_subject_preselects_the_subject() {
 #[tokio::test]
 async fn signed_in_user_reports_a_gait_in_their_own_name() {
     let (_folder, service) = callers::service().await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = format!("/trials/{}", service.trials(study).await[0].id);
     let clinician = signed_in(&service, Role::Clinician).await;
@@ -572,7 +572,7 @@ async fn refused_forms_name_fields_by_their_labels() {
 #[tokio::test]
 async fn script_trial_without_a_gait_offers_no_gait() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 1)).await;
+    let study = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 1)).await;
     let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
     let trial = trial["id"].as_str().unwrap();
     let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
@@ -614,18 +614,17 @@ async fn ended_study_is_extended_on_its_page() {
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("min=\"6\"") && !page.contains("value=\"stop\""), "{page}");
     let path = format!("/studies/{study}/do");
-    let same = service.post_text(&path, FORM, "transition=extend&trial_budget=5").await;
-    is_page(
-        &same,
-        StatusCode::UNPROCESSABLE_ENTITY,
-        "\u{201c}Total number of trials\u{201d} is 5; it must be 6 to 10000.",
-    );
+    let same = service.post_text(&path, FORM, "transition=extend&number_of_trials=5").await;
+    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Number of trials\u{201d} is 5; it must be 6 to 10000.");
     is_page(
         &service.post_text(&path, FORM, "transition=extend").await,
         StatusCode::UNPROCESSABLE_ENTITY,
-        "\u{201c}Total number of trials\u{201d} must be a whole number.",
+        "\u{201c}Number of trials\u{201d} must be a whole number.",
     );
-    assert_eq!(service.post_text(&path, FORM, "transition=extend&trial_budget=7").await.status, StatusCode::SEE_OTHER);
+    assert_eq!(
+        service.post_text(&path, FORM, "transition=extend&number_of_trials=7").await.status,
+        StatusCode::SEE_OTHER
+    );
     service.wait_for_trials(study, 7).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
@@ -663,7 +662,7 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
 }
 
 /// The fields of the form for a new study, without subject.
-const STUDY: &str = "muscles=off&feedback_mode=human&parallel_trials=1&tuned_a5=on&device=&reference_gait=";
+const STUDY: &str = "muscles=off&answer_source=people&parallel_trials=1&tuned_a5=on&device=&reference_gait=";
 
 /// The study that a redirect leads to.
 #[track_caller]
@@ -676,7 +675,7 @@ fn made(answer: &Answer) -> StudyId {
 async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
     let (_folder, service) = service().await;
     let body = format!(
-        "{STUDY}&subject=new&pseudonym=&height_m=173&body_mass_kg=65,7&trial_budget=0&seed=-1&values_a5=0,high"
+        "{STUDY}&subject=new&pseudonym=&height_m=173&body_mass_kg=65,7&number_of_trials=0&seed=-1&values_a5=0,high"
     );
     let refused = service.post_text("/studies/new", FORM, &body).await;
     is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "6 fields need correcting");
@@ -684,13 +683,14 @@ async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
         "\u{201c}Pseudonym\u{201d} must be",
         "Did you mean 1.73 m?",
         "Did you mean 65.7 kg?",
-        "\u{201c}Trials\u{201d} is 0",
+        "\u{201c}Number of trials\u{201d} is 0",
         "\u{201c}Seed\u{201d}",
         "\u{201c}Values of a5\u{201d}",
     ] {
         assert!(refused.text.contains(says), "{says}: {}", refused.text);
     }
-    for kept in ["value=\"human\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""]
+    for kept in
+        ["value=\"people\" checked", "value=\"173\" inputmode=\"decimal\"", "value=\"65,7\"", "value=\"0,high\""]
     {
         assert!(refused.text.contains(kept), "{kept}: {}", refused.text);
     }
@@ -703,7 +703,8 @@ async fn study_form_reports_every_refused_field_and_keeps_what_was_chosen() {
 #[tokio::test]
 async fn height_and_mass_are_accepted_in_customary_units() {
     let (_folder, service) = service().await;
-    let body = format!("{STUDY}&subject=new&pseudonym=S7&height_m=5+ft+8+in&body_mass_kg=145+lb&trial_budget=1&seed=1");
+    let body =
+        format!("{STUDY}&subject=new&pseudonym=S7&height_m=5+ft+8+in&body_mass_kg=145+lb&number_of_trials=1&seed=1");
     let study = made(&service.post_text("/studies/new", FORM, &body).await);
     let body = service.get(study).await.plan.body;
     assert_eq!((body.height_m, body.body_mass_kg), (1.727, 65.77));
@@ -725,9 +726,9 @@ async fn subject_form_reports_every_refused_field() {
 #[tokio::test]
 async fn study_is_renamed_tagged_found_and_archived() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 2).await;
+    let study = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let other = service.study(|new| (new.trial_budget, new.name) = (1, Some("Other".to_owned()))).await;
+    let other = service.study(|new| (new.number_of_trials, new.name) = (1, Some("Other".to_owned()))).await;
     service.wait_for(other, &[StudyState::Finished]).await;
     let details = format!("/studies/{study}/details");
     let form = "button=save&name=Visit+2&tags=treadmill,+pilot,pilot&notes=shoes%0D%0Anew";
@@ -772,7 +773,7 @@ async fn study_is_renamed_tagged_found_and_archived() {
 #[tokio::test]
 async fn running_study_cannot_be_archived() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let refused = service.post_text(&format!("/studies/{study}/details"), FORM, "button=archive").await;
     is_page(&refused, StatusCode::CONFLICT, "A study that has not ended cannot be archived");
@@ -783,7 +784,7 @@ async fn running_study_cannot_be_archived() {
 #[tokio::test]
 async fn heights_and_masses_have_the_units_that_the_browser_prefers() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     let chosen = service.post_text("/units", FORM, "units=customary").await;
     assert_eq!((chosen.status, &chosen.headers["location"]), (StatusCode::SEE_OTHER, &"/subjects".parse().unwrap()));
     let kept = callers::cookie_of(&chosen, "gaitwright_units");
@@ -811,7 +812,7 @@ async fn clone_has_the_set_up_of_its_study_with_relaxed_bounds() {
     let (_folder, service) = service().await;
     let study = service
         .study(|new| {
-            (new.trial_budget, new.seed, new.priority, new.solve_seconds_budget) = (3, 7, 4, Some(500.0));
+            (new.number_of_trials, new.seed, new.priority, new.solve_seconds_budget) = (3, 7, 4, Some(500.0));
             new.base_bounds.a6 = 0.25;
         })
         .await;
@@ -819,12 +820,12 @@ async fn clone_has_the_set_up_of_its_study_with_relaxed_bounds() {
     let form = service.fetch(&format!("/studies/new?like={study}&relax=a7%3D35")).await;
     is_page(&form, StatusCode::OK, "with relaxed <a href=\"#bounds\">bounds</a>");
     for filled in
-        ["name=\"seed\" value=\"7\"", "name=\"values_a7\" value=\"35, 50\"", "name=\"trial_budget\" value=\"3\""]
+        ["name=\"seed\" value=\"7\"", "name=\"values_a7\" value=\"35, 50\"", "name=\"number_of_trials\" value=\"3\""]
     {
         assert!(form.text.contains(filled), "{filled}");
     }
     let subject = service.subject().await;
-    let body = format!("{STUDY}&subject={subject}&trial_budget=1&seed=8&values_a5=0,0.02&like={study}");
+    let body = format!("{STUDY}&subject={subject}&number_of_trials=1&seed=8&values_a5=0,0.02&like={study}");
     let clone = service.get(made(&service.post_text("/studies/new", FORM, &body).await)).await.plan;
     assert_eq!((clone.seed, clone.priority, clone.solve_seconds_budget), (8, 4, Some(500.0)), "the rest is copied");
     is_page(&service.fetch(&format!("/studies/new?like={UNKNOWN}")).await, StatusCode::NOT_FOUND, "There is no");
@@ -843,7 +844,7 @@ async fn equal_names_are_refused_or_numbered_without_naming_hidden_studies() {
     let clinician = signed_in(&service, Role::Clinician).await;
     let subject = service.subject().await;
     let body = |name: &str, extra: &str| {
-        format!("{STUDY}&subject={subject}&trial_budget=1&seed=1&values_a5=0,0.02&name={name}{extra}")
+        format!("{STUDY}&subject={subject}&number_of_trials=1&seed=1&values_a5=0,0.02&name={name}{extra}")
     };
     let send_as =
         async |who: &callers::As, body: &str| send(&service, who, &Method::POST, "/studies/new", FORM, body).await;

@@ -177,6 +177,32 @@ fn every_benchmark_names_an_existing_program() {
     assert!(missing.is_empty(), "{missing:#?}");
 }
 
+/// `.ci/benchmarks` writes the results, so each looks as the script writes it.
+#[test]
+fn results_of_benchmarks_are_written_by_the_script() {
+    let page = std::fs::read_to_string(repository().join("docs/benchmarks.md")).unwrap();
+    let mut benchmarks = 0;
+    for section in page.split("\n## ").skip(1) {
+        let (question, rest) = section.split_once("\n\n").unwrap();
+        assert!(question.ends_with('?'), "{question}");
+        let (command, result) = rest.strip_prefix("```sh\n").and_then(|rest| rest.split_once("\n```\n\n")).unwrap();
+        assert!(!command.contains('\n'), "{question}: {command}");
+        let (measured, output) =
+            result.split_once("\n\n```text\n").unwrap_or_else(|| panic!("{question} has no result"));
+        let parts = [": ", " cores, load average ", " at the start, version ", ", commit ", ", "];
+        let mut left = measured.strip_prefix("Measured on ").unwrap_or_else(|| panic!("{question}: {measured}"));
+        for part in parts {
+            left = left.split_once(part).unwrap_or_else(|| panic!("{question}: {measured}")).1;
+        }
+        let seconds = left.strip_suffix(" s.").and_then(|seconds| seconds.parse::<u32>().ok());
+        assert!(seconds.is_some(), "{question}: {measured}");
+        let after = output.split_once("\n```").unwrap().1;
+        assert!(after.trim().is_empty(), "{question}: {after}");
+        benchmarks += 1;
+    }
+    assert!(benchmarks > 10, "{benchmarks}");
+}
+
 /// An address with every identifier replaced: `/studies/STUDY/ask` is `/studies/{}/ask`.
 fn template(address: &str) -> String {
     let part = |part: &str| {
@@ -274,7 +300,17 @@ fn every_link_of_a_page_to_a_guide_has_its_section() {
         }
     }
     assert!(sections > 15, "{sections}");
-    for guide in ["clinician", "rater", "lab-session", "lab-script", "administrator", "glossary"] {
+    for guide in [
+        "clinician",
+        "rater",
+        "lab-session",
+        "lab-script",
+        "unattended",
+        "administrator",
+        "developer",
+        "method",
+        "glossary",
+    ] {
         assert!(linked.contains(guide), "no page links to the guide {guide}");
     }
 }

@@ -5,7 +5,7 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::TunedBounds;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, events};
 use gaitwright_tests::analytic::Analytic;
@@ -25,7 +25,7 @@ async fn service() -> (TempDir, Service) {
 }
 
 async fn finished(service: &Service, trials: u32) -> StudyId {
-    let study = service.study(|new| new.trial_budget = trials).await;
+    let study = service.study(|new| new.number_of_trials = trials).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     study
 }
@@ -134,7 +134,7 @@ async fn unknown_objects_are_not_found() {
 #[tokio::test]
 async fn study_is_created_run_and_read_as_json_and_csv() {
     let (_folder, service) = service().await;
-    let body = json!({"subject_id": service.subject().await, "trial_budget": 5, "seed": 3, "name": "First"});
+    let body = json!({"subject_id": service.subject().await, "number_of_trials": 5, "seed": 3, "name": "First"});
     let made = service.post("/api/v1/studies", &body).await;
     assert_eq!(made.status, StatusCode::CREATED, "{}", made.text);
     let study: StudyId = made.json()["id"].as_str().unwrap().parse().unwrap();
@@ -173,7 +173,7 @@ async fn invalid_study_is_refused_with_the_field() {
     let subject = service.subject().await;
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     for (field, value, named) in [
-        ("trial_budget", json!(0), "trial_budget"),
+        ("number_of_trials", json!(0), "number_of_trials"),
         ("parallel_trials", json!(65), "parallel_trials"),
         ("priority", json!(11), "priority"),
         ("seed", json!(9_007_199_254_740_992_u64), "seed"),
@@ -228,8 +228,8 @@ async fn preferences_are_created_read_and_retracted() {
     assert_eq!((&row["content"]["kind"], &row["content"]["winner"]), (&json!("preference"), &json!(converged[1])));
     assert_eq!(service.fetch(given.headers["location"].to_str().unwrap()).await.json(), row);
 
-    let tie = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "no_difference"});
-    assert_eq!(service.post(&path, &tie).await.json()["content"]["kind"], "tie");
+    let equal = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "no_difference"});
+    assert_eq!(service.post(&path, &equal).await.json()["content"]["kind"], "no_difference");
 
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     let itself = json!({"trial_a": converged[0], "trial_b": converged[0], "answer": "a"});
@@ -262,7 +262,7 @@ async fn preferences_are_created_read_and_retracted() {
 #[tokio::test]
 async fn study_with_human_answers_waits_for_each_and_page_and_rest_have_the_same_effect() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     let mut through_form = false;
     loop {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
@@ -308,7 +308,7 @@ async fn study_is_paused_resumed_and_stopped_and_refuses_invalid_changes_of_stat
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(std::time::Duration::from_millis(10));
     let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
-    let study = service.study(|new| new.trial_budget = 50).await;
+    let study = service.study(|new| new.number_of_trials = 50).await;
     let act = |act: &str| format!("/api/v1/studies/{study}/{act}");
     let nothing = json!({});
     assert_eq!(service.post(&act("pause"), &nothing).await.json()["state"], "paused");
@@ -339,7 +339,7 @@ async fn trial_is_cancelled_and_retried() {
     let folder = tempfile::tempdir().unwrap();
     let slow = Analytic::slow(std::time::Duration::from_millis(20));
     let service = Service::start(&folder.path().join("a.db"), slow, 1).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     while service.trials(study).await.first().is_none_or(|t| t.state != TrialState::Running) {
         tokio::time::sleep(std::time::Duration::from_millis(5)).await;
     }
@@ -351,7 +351,7 @@ async fn trial_is_cancelled_and_retried() {
     is_problem(&again, StatusCode::CONFLICT, "/problems/conflict", "cancelled");
     assert!(service.feedback(study).await.is_empty(), "the learner does not hear of it");
 
-    let more = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"trial_budget": 2})).await;
+    let more = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"number_of_trials": 2})).await;
     assert_eq!(more.status, StatusCode::OK, "{}", more.text);
     let retried = service.post(&format!("/api/v1/trials/{trial}/retry"), &json!({})).await;
     assert_eq!(retried.status, StatusCode::ACCEPTED, "{}", retried.text);
@@ -397,8 +397,8 @@ async fn refused_study_form_is_shown_again_with_its_errors() {
     let (_folder, service) = service().await;
     let form = |height: &str, trials: &str| {
         format!(
-            "subject=new&pseudonym=S07&height_m={height}&body_mass_kg=70&muscles=on&feedback_mode=automatic\
-             &trial_budget={trials}&parallel_trials=1&seed=1&name="
+            "subject=new&pseudonym=S07&height_m={height}&body_mass_kg=70&muscles=on&answer_source=gait_rmse\
+             &number_of_trials={trials}&parallel_trials=1&seed=1&name="
         )
     };
     let kind = "application/x-www-form-urlencoded";
@@ -504,7 +504,7 @@ async fn event_stream_reports_the_end_of_a_study_and_resumes_with_it() {
         first.contains("event: study_state") && first.contains("finished") && first.contains("All 2 trials"),
         "{first}"
     );
-    let extended = service.post(&format!("{path}/extend"), &json!({"trial_budget": 3})).await;
+    let extended = service.post(&format!("{path}/extend"), &json!({"number_of_trials": 3})).await;
     assert_eq!(extended.status, StatusCode::OK, "{}", extended.text);
     let next = next_event().await;
     assert!(next.contains("event: study_changed") && next.contains("running") && next.contains("id: "), "{next}");

@@ -50,7 +50,7 @@ async fn admitted(store: &Store, trial: TrialId) -> Result<Certified, NotWalkabl
 async fn gait_of_an_untrusted_archive_is_walkable_only_after_its_certificate_passed() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let [unsigned, signed] = imported(folder.path(), &service.store, study).await;
     service.stop().await;
@@ -73,7 +73,7 @@ async fn gait_of_an_untrusted_archive_is_walkable_only_after_its_certificate_pas
 async fn lab_script_trial_is_walkable_only_if_its_archive_has_a_trusted_signature() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.evaluation) = (2, Evaluation::Script)).await;
+    let study = service.study(|new| (new.number_of_trials, new.evaluation) = (2, Evaluation::Script)).await;
     let trial = scripted::trial(&service, study).await;
     let [unsigned, signed] = imported(folder.path(), &service.store, study).await;
     service.stop().await;
@@ -88,7 +88,7 @@ async fn lab_script_trial_is_walkable_only_if_its_archive_has_a_trusted_signatur
 async fn imported_trial_without_its_gait_is_not_walkable() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut writer = service.store.write().await.unwrap();
     assert!(gaits::drop_of_study(&mut writer, study, &[]).await.unwrap() > 0);
@@ -107,7 +107,7 @@ async fn imported_trial_without_its_gait_is_not_walkable() {
 async fn report_covers_the_same_motion_in_an_imported_study() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let clone = service.post(&format!("/api/v1/studies/{study}/clone"), &json!({"start": true})).await.json();
     let clone: StudyId = clone["id"].as_str().unwrap().parse().unwrap();

@@ -29,7 +29,8 @@ async fn service() -> (TempDir, Service, StudyId, Clearance) {
     let certifier = Verdicts { pause: Duration::from_millis(300), passes: |_: &Gait| true };
     let solver = Analytic::slow(Duration::from_millis(10));
     let service = Service::start_looking_back(&folder.path().join("a.db"), solver, certifier, explainer).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits().into()))).await;
+    let study =
+        service.study(|new| (new.number_of_trials, new.search_space) = (60, Some(with_few_gaits().into()))).await;
     (folder, service, study, watched)
 }
 
@@ -108,7 +109,8 @@ async fn requested_certificate_is_computed_after_a_restart_unless_cancelled() {
     let solver = || Analytic::slow(Duration::from_millis(10));
     let slow = certifier(Duration::from_mins(10));
     let service = Service::start_looking_back(&database, solver(), slow, Clearance::default()).await;
-    let study = service.study(|new| (new.trial_budget, new.search_space) = (60, Some(with_few_gaits().into()))).await;
+    let study =
+        service.study(|new| (new.number_of_trials, new.search_space) = (60, Some(with_few_gaits().into()))).await;
     let mut converged = Vec::new();
     while converged.len() < 2 {
         tokio::time::sleep(Duration::from_millis(5)).await;

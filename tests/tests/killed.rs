@@ -54,7 +54,8 @@ fn splitmix(state: &mut u64) -> u64 {
 fn start_study(address: &str) -> String {
     let subjects = get(address, "/api/v1/subjects").unwrap().items();
     let subject = subjects.as_array().unwrap().iter().find(|s| s["pseudonym"] == "paper-1").unwrap()["id"].clone();
-    let made = post(address, "/api/v1/studies", &json!({"subject_id": subject, "trial_budget": TRIALS, "seed": 11}));
+    let made =
+        post(address, "/api/v1/studies", &json!({"subject_id": subject, "number_of_trials": TRIALS, "seed": 11}));
     made.unwrap().json()["id"].as_str().unwrap().to_owned()
 }
 

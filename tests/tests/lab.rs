@@ -14,7 +14,7 @@ use gaitwright_store::{LabSessionId, Store, StudyId, audit, lab_sessions};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::archives::{exported, import};
 use gaitwright_tests::consistent_gaits::Consistent;
-use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::measured::{electromyogram, joint_angles};
 use gaitwright_tests::read_allocations::gait_a_first;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
@@ -31,7 +31,7 @@ async fn finished() -> (TempDir, Service, StudyId, Vec<Trial>) {
 async fn finished_by(solver: impl Evaluate) -> (TempDir, Service, StudyId, Vec<Trial>) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 24).await;
+    let study = service.study(|new| new.number_of_trials = 24).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     (folder, service, study, trials)
@@ -97,7 +97,7 @@ async fn lab_session_records_walks_in_order_closes_and_is_unblinded() {
     assert_eq!(service.post(&format!("{api}/close"), &json!({})).await.status, StatusCode::CONFLICT);
     assert!(service.fetch(&format!("{api}/next-walk")).await.json()["walk"].is_null());
     let trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 6).await.unwrap();
-    let acts: Vec<_> = trail.iter().map(|row| row.action.trim_start_matches("lab_session.")).collect();
+    let acts: Vec<_> = trail.iter().map(|row| row.change.trim_start_matches("lab_session.")).collect();
     assert_eq!(acts, ["close", "walk", "unblind", "walk", "walk", "plan"]);
     service.stop().await;
 }
@@ -157,7 +157,7 @@ async fn lab_session_reveals_no_gait_before_unblinding() {
 async fn each_walk_gets_the_controller_file_of_its_own_gait() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), WellFormed::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 24).await;
+    let study = service.study(|new| new.number_of_trials = 24).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let gaits = converged(&trials);
@@ -303,7 +303,7 @@ async fn unsafe_walk_excludes_both_gaits_until_unblinding() {
 async fn lab_session_requires_two_converged_gaits_of_its_study() {
     let (_folder, service, study, trials) = finished().await;
     let gaits = converged(&trials);
-    let other = service.study(|new| new.trial_budget = 1).await;
+    let other = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(other, &[StudyState::Finished]).await;
     let foreign = service.trials(other).await[0].id;
     let no_gait = trials.iter().find(|trial| trial.state != TrialState::Converged).unwrap().id;
@@ -355,7 +355,7 @@ async fn lab_session_form_offers_each_motion_once_and_no_unsafe_gait() {
     let study = service
         .study(|new| {
             new.search_space = Some(inactive_bound().into());
-            new.trial_budget = 3;
+            new.number_of_trials = 3;
         })
         .await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -540,14 +540,14 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
         assert!(refused.text.contains(expected), "{expected}: {}", refused.text);
     }
     for (change, expected) in [
-        (json!({"recording": motion().replace("\n5,", "\n5,x")}), "recording, line 502, column 2"),
+        (json!({"recording": joint_angles().replace("\n5,", "\n5,x")}), "recording, line 502, column 2"),
         (json!({"recording": "time_s,knee\n0,1"}), "recording"),
         (json!({"reading": {"cutoff_hz": 90.0}}), "reading.cutoff_hz"),
         (json!({"walk": 2}), "Walk 2 is not recorded yet"),
     ] {
-        let mut body = json!({"walk": 1, "recording": motion()});
+        let mut body = json!({"walk": 1, "recording": joint_angles()});
         body.as_object_mut().unwrap().extend(change.as_object().unwrap().clone());
-        let refused = service.post(&format!("{api}/measurement-files/motion"), &body).await;
+        let refused = service.post(&format!("{api}/measurement-files/joint-angles"), &body).await;
         assert!(refused.status.is_client_error() && refused.text.contains(expected), "{expected}: {}", refused.text);
     }
     let page = format!("/lab-sessions/{}", id(&session));
@@ -569,7 +569,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
             "\u{201c}Sampling rate, Hz\u{201d} is \u{201c}fast\u{201d}; it must be a number",
         ),
         (
-            "motion",
+            "joint-angles",
             "walk=1&format=csv&recording=x&cutoff_hz=fast",
             "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}fast\u{201d}",
         ),
@@ -592,10 +592,10 @@ async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
     for walk in 1..=2 {
         service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": walk})).await;
     }
-    let recording = motion().replace('\n', "%0A").replace(',', "%2C");
+    let recording = joint_angles().replace('\n', "%0A").replace(',', "%2C");
     for walk in 1..=2 {
         let form = format!("walk={walk}&format=csv&unit=&cutoff_hz=6&recording=%23 walk {walk}%0A{recording}");
-        let kept = service.post_text(&format!("{page}/measurement-files/motion"), FORM, &form).await;
+        let kept = service.post_text(&format!("{page}/measurement-files/joint-angles"), FORM, &form).await;
         assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     }
     let cycles = service.fetch(&format!("{api}/limit-cycles")).await.items();

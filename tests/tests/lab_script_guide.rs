@@ -4,7 +4,7 @@
 
 use axum::http::StatusCode;
 use gaitwright_http::openapi;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::page_routes;
@@ -159,7 +159,7 @@ fn unknown_addresses_parameters_and_methods_are_found() {
 async fn every_body_of_the_guide_is_accepted() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (10, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (10, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let converged: Vec<_> =
         service.trials(study).await.into_iter().filter(|trial| trial.state == TrialState::Converged).collect();

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{FeedbackId, StudyId, TrialId, lab_sessions};
 use gaitwright_tests::callers::FORM;
@@ -45,32 +45,32 @@ async fn clear(service: &Service, gait: &str) {
 
 /// A study that waits for the answer to a pair, and the address of the pair.
 async fn pair(service: &Service) -> (StudyId, String) {
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    (study, pair["pair"]["token"].as_str().unwrap().to_owned())
+    (study, pair["pair"]["code"].as_str().unwrap().to_owned())
 }
 
-async fn rate(service: &Service, token: &str, answer: &str) -> Answer {
-    service.post(&format!("/api/v1/blind-pairs/{token}/answer"), &json!({"answer": answer})).await
+async fn rate(service: &Service, code: &str, answer: &str) -> Answer {
+    service.post(&format!("/api/v1/blind-pairs/{code}/answer"), &json!({"answer": answer})).await
 }
 
 #[tokio::test]
 async fn rater_reports_a_gait_of_an_answered_pair() {
     let (_folder, service) = service().await;
-    let (study, token) = pair(&service).await;
-    assert_eq!(rate(&service, &token, "first").await.status, StatusCode::OK);
-    assert_eq!(rate(&service, &token, "second").await.status, StatusCode::CONFLICT);
-    let page = service.fetch(&format!("/rate/pair/{token}")).await.text;
+    let (study, code) = pair(&service).await;
+    assert_eq!(rate(&service, &code, "first").await.status, StatusCode::OK);
+    assert_eq!(rate(&service, &code, "second").await.status, StatusCode::CONFLICT);
+    let page = service.fetch(&format!("/rate/pair/{code}")).await.text;
     assert!(page.contains("Report a gait in this pair as unsafe"), "{page}");
     let form = "answer=unsafe_second&note=knee+buckled";
-    let sent = service.post_text(&format!("/rate/pair/{token}"), FORM, form).await;
+    let sent = service.post_text(&format!("/rate/pair/{code}"), FORM, form).await;
     assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
-    let told = service.fetch(&format!("/rate?saved={token}&reported=true")).await.text;
+    let told = service.fetch(&format!("/rate?saved={code}&reported=true")).await.text;
     assert!(told.contains("Your safety report has been recorded"), "{told}");
     assert_eq!(closed(&service, study).await.len(), 1);
     // The other one, too.
-    assert_eq!(rate(&service, &token, "unsafe_both").await.status, StatusCode::OK);
+    assert_eq!(rate(&service, &code, "unsafe_both").await.status, StatusCode::OK);
     assert_eq!(closed(&service, study).await.len(), 2);
     service.stop().await;
 }
@@ -78,12 +78,12 @@ async fn rater_reports_a_gait_of_an_answered_pair() {
 #[tokio::test]
 async fn rater_reports_a_gait_of_a_retracted_pair() {
     let (_folder, service) = service().await;
-    let (study, token) = pair(&service).await;
-    assert_eq!(rate(&service, &token, "first").await.status, StatusCode::OK);
-    let retracted = service.post_text(&format!("/rate/pair/{token}/retract"), FORM, "").await;
+    let (study, code) = pair(&service).await;
+    assert_eq!(rate(&service, &code, "first").await.status, StatusCode::OK);
+    let retracted = service.post_text(&format!("/rate/pair/{code}/retract"), FORM, "").await;
     assert_eq!(retracted.status, StatusCode::SEE_OTHER, "{}", retracted.text);
-    assert_eq!(rate(&service, &token, "first").await.status, StatusCode::CONFLICT);
-    assert_eq!(rate(&service, &token, "unsafe_first").await.status, StatusCode::OK);
+    assert_eq!(rate(&service, &code, "first").await.status, StatusCode::CONFLICT);
+    assert_eq!(rate(&service, &code, "unsafe_first").await.status, StatusCode::OK);
     assert_eq!(closed(&service, study).await.len(), 1);
     service.stop().await;
 }
@@ -91,9 +91,9 @@ async fn rater_reports_a_gait_of_a_retracted_pair() {
 #[tokio::test]
 async fn repeated_report_counts_once_until_staff_clear_the_gait() {
     let (_folder, service) = service().await;
-    let (study, token) = pair(&service).await;
+    let (study, code) = pair(&service).await;
     for _ in 0..2 {
-        assert_eq!(rate(&service, &token, "unsafe_first").await.status, StatusCode::OK);
+        assert_eq!(rate(&service, &code, "unsafe_first").await.status, StatusCode::OK);
     }
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
     assert_eq!(reports.as_array().unwrap().len(), 1, "{reports}");
@@ -104,13 +104,13 @@ async fn repeated_report_counts_once_until_staff_clear_the_gait() {
         StatusCode::CREATED
     );
     assert!(closed(&service, study).await.is_empty());
-    assert_eq!(rate(&service, &token, "unsafe_first").await.status, StatusCode::OK);
+    assert_eq!(rate(&service, &code, "unsafe_first").await.status, StatusCode::OK);
     assert_eq!(closed(&service, study).await, BTreeSet::from([gait.clone()]));
-    assert_eq!(rate(&service, &token, "unsafe_both").await.status, StatusCode::OK);
+    assert_eq!(rate(&service, &code, "unsafe_both").await.status, StatusCode::OK);
     let both = closed(&service, study).await;
     assert_eq!(both.len(), 2);
     clear(&service, &gait).await;
-    assert_eq!(rate(&service, &token, "unsafe_both").await.status, StatusCode::OK);
+    assert_eq!(rate(&service, &code, "unsafe_both").await.status, StatusCode::OK);
     assert_eq!(closed(&service, study).await, both, "also if only one of two gaits was cleared");
     service.stop().await;
 }
@@ -118,7 +118,7 @@ async fn repeated_report_counts_once_until_staff_clear_the_gait() {
 #[tokio::test]
 async fn comparison_form_reports_a_gait_after_another_answer() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let trials = converged(&service, study).await;
     let [a, b] = [trials[0].id, trials[1].id];
@@ -151,7 +151,7 @@ struct Lab {
 
 impl Lab {
     async fn planned(service: &Service) -> Self {
-        let study = service.study(|new| new.trial_budget = 12).await;
+        let study = service.study(|new| new.number_of_trials = 12).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trials = converged(service, study).await;
         let gaits = [trials[0].id, trials[1].id];
@@ -218,7 +218,7 @@ async fn second_report_of_a_session_is_also_recorded() {
         assert_eq!(closed(&service, lab.study).await, names(&lab.gaits), "{again}");
     }
     let reports = service.fetch(&format!("/api/v1/studies/{}/safety-reports", lab.study)).await.items().to_string();
-    assert!(reports.contains("the subject in lab session 1 (walk 3; blinded, so either gait)"), "{reports}");
+    assert!(reports.contains("the subject in lab session 1 (walk 3; blinded, may be either gait)"), "{reports}");
     service.stop().await;
 }
 

@@ -274,7 +274,7 @@ async fn only_the_owner_can_read_the_record_and_its_backups() {
     use std::os::unix::fs::PermissionsExt;
     let (folder, _database, service) = service().await;
     service.backed_up().await;
-    let study = service.study(|new| (new.trial_budget, new.start) = (1, false)).await;
+    let study = service.study(|new| (new.number_of_trials, new.start) = (1, false)).await;
     let binary = env!("CARGO_BIN_EXE_gaitwright-cli");
     for arguments in [
         &["backup", "copy.db", "--database", "a.db"][..],
@@ -307,7 +307,7 @@ fn on_read_only_mount(folder: &Path, arguments: &str) -> Option<std::process::Ou
 async fn verify_backup_and_export_work_on_a_read_only_file_system() {
     let (folder, database, service) = service().await;
     let out = tempfile::tempdir().unwrap();
-    let study = service.study(|new| (new.trial_budget, new.start) = (1, false)).await;
+    let study = service.study(|new| (new.number_of_trials, new.start) = (1, false)).await;
     add_subjects(&service, "S", 3).await;
     let killed = tempfile::tempdir().unwrap();
     for ending in ["", "-wal", ".anchor"] {

@@ -8,7 +8,7 @@
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gaitwright_http::openapi;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::compatibility::{Difference, compare};
 use gaitwright_tests::described::Description;
@@ -76,7 +76,7 @@ fn takes_key(operation: &Value) -> bool {
 async fn repeated_change_with_a_key_happens_once_or_refuses_the_key_as_described() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let draft = service.study(|new| new.start = false).await.to_string();
     let subject = service.subject().await.to_string();
@@ -97,7 +97,7 @@ async fn repeated_change_with_a_key_happens_once_or_refuses_the_key_as_described
         "consents" => json!({"form": "form 3"}),
         "corrections" => json!({"height_m": 1.8, "body_mass_kg": 70, "reason": "r"}),
         "studies" => json!({"subject_id": subject, "start": false}),
-        "extend" => json!({"trial_budget": 7}),
+        "extend" => json!({"number_of_trials": 7}),
         "preferences" => json!({"trial_a": trial, "trial_b": other, "answer": "a"}),
         "assessments" => json!({"trial_a": trial, "trial_b": other, "answer": "cannot_tell"}),
         "users" => json!({"name": "K", "role": "clinician"}),
@@ -111,7 +111,7 @@ async fn repeated_change_with_a_key_happens_once_or_refuses_the_key_as_described
     for (path, item) in document["paths"].as_object().unwrap() {
         for (method, operation) in item.as_object().unwrap().iter().filter(|(method, _)| *method != "get") {
             let address =
-                path.replace("{id}", &id_of(path)).replace("{token}", &"0".repeat(64)).replace("{side}", "first");
+                path.replace("{id}", &id_of(path)).replace("{code}", &"0".repeat(64)).replace("{side}", "first");
             let send = async || {
                 let request = Request::builder().method(method.to_uppercase().as_str()).uri(&address);
                 let request =
@@ -211,9 +211,9 @@ async fn description_is_served_and_its_page_has_no_external_resources() {
 async fn responses_have_the_described_properties() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let script = service.study(|new| (new.trial_budget, new.evaluation) = (3, Evaluation::Script)).await;
+    let script = service.study(|new| (new.number_of_trials, new.evaluation) = (3, Evaluation::Script)).await;
     service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await;
     let trials = service.trials(study).await;
     let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});

@@ -1,16 +1,16 @@
-//! Running the service: archives, retention, migrations, figures, HTTPS, restore.
+//! Running the service: archives, retention, migrations, metrics, HTTPS, restore.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
 use gait_optimizer::SolveStatus;
-use gaitwright_service::studies::archive::file::read_through;
+use gaitwright_service::studies::archive::archive_file::read_through;
 use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, certificates, commit, explanations, gaits, members, read_only, studies};
 use gaitwright_tests::analytic::Analytic;
@@ -31,8 +31,8 @@ async fn posterior(service: &Service, study: gaitwright_store::StudyId) -> Vec<(
     let study = studies::get(&mut reader, study).await.unwrap();
     let snapshot = StudySnapshot::read(&mut reader, study).await.unwrap();
     let plan = &snapshot.study.plan;
-    let belief = gait_learner::posterior(&plan.search_space, &snapshot.log(), &plan.learner).unwrap();
-    let mean = |trial: &gaitwright_store::trials::Trial| belief.mean(trial.action_index).unwrap().to_bits();
+    let posterior = gait_learner::posterior(&plan.search_space, &snapshot.log(), &plan.learner).unwrap();
+    let mean = |trial: &gaitwright_store::trials::Trial| posterior.mean(trial.action_index).unwrap().to_bits();
     snapshot.trials.iter().map(|trial| (trial.action_index.0, mean(trial))).collect()
 }
 
@@ -40,7 +40,7 @@ async fn posterior(service: &Service, study: gaitwright_store::StudyId) -> Vec<(
 async fn exported_study_gives_the_same_posterior_in_another_record() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let converged: Vec<_> =
@@ -65,7 +65,7 @@ async fn exported_study_gives_the_same_posterior_in_another_record() {
 
     // A second record with its own rows.
     let other = Service::start(&folder.path().join("b.db"), Consistent::default(), 1).await;
-    let own = other.study(|new| (new.trial_budget, new.seed) = (3, 5)).await;
+    let own = other.study(|new| (new.number_of_trials, new.seed) = (3, 5)).await;
     other.wait_for(own, &[StudyState::Finished]).await;
     assert_eq!(import(&other.store, &file).await.unwrap(), study, "its subject is the built-in one there");
     assert_eq!(posterior(&other, study).await, expected);
@@ -104,7 +104,7 @@ async fn prune_drops_old_trajectories_and_keeps_the_best() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     assert_eq!(prune(&mut service.store.clone(), 1).await.unwrap(), 0, "it ended just now");
     let mut kept = 0;
@@ -148,7 +148,7 @@ async fn prune_drops_old_trajectories_and_keeps_the_best() {
 async fn metrics_count_requests_by_route() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 2).await;
-    let study = service.study(|new| new.trial_budget = 2).await;
+    let study = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let text = service.fetch("/metrics").await.text;
     assert!(text.contains("gaitwright_studies{state=\"finished\"} 1"), "{text}");
@@ -188,14 +188,14 @@ async fn restore_keeps_the_present_record_beside_the_backup() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("gaitwright.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 4).await;
+    let study = service.study(|new| new.number_of_trials = 4).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let before = service.fetch(&format!("/api/v1/studies/{study}/trials")).await.text;
     let (done, text) = gaitwright(folder.path(), &["backup", "copy.db"]);
     assert!(done, "{text}");
     let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
     assert!(!done && text.contains("in use by another gaitwright process"), "{text}");
-    let later = service.study(|new| new.trial_budget = 1).await;
+    let later = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(later, &[StudyState::Finished]).await;
     service.stop().await;
 
@@ -227,7 +227,7 @@ async fn restore_replaces_a_damaged_or_newer_record_and_keeps_it() {
     let folder = tempfile::tempdir().unwrap();
     let (database, copy) = (folder.path().join("gaitwright.db"), folder.path().join("copy.db"));
     let service = Service::start(&copy, Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 2).await;
+    let study = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
 
@@ -260,7 +260,7 @@ async fn restore_includes_the_log_of_the_backup() {
     let folder = tempfile::tempdir().unwrap();
     let live = folder.path().join("live.db");
     let service = Service::start(&live, Analytic::default(), 1).await;
-    service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
     // A copy by hand, which is not recommended, but together with the log.
     for ending in ["", "-wal"] {
         std::fs::copy(folder.path().join(format!("live.db{ending}")), folder.path().join(format!("copy.db{ending}")))
@@ -366,8 +366,8 @@ fn anchor_in_a_folder_that_does_not_exist_is_refused() {
 async fn restricted_study_stays_restricted_after_import() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let restricted = service.study(|new| (new.trial_budget, new.restricted) = (2, true)).await;
-    let open = service.study(|new| new.trial_budget = 2).await;
+    let restricted = service.study(|new| (new.number_of_trials, new.restricted) = (2, true)).await;
+    let open = service.study(|new| new.number_of_trials = 2).await;
     for study in [restricted, open] {
         service.wait_for(study, &[StudyState::Finished]).await;
     }

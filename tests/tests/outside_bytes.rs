@@ -6,7 +6,7 @@
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Request, StatusCode};
 use gaitwright_http::{AccessState, openapi};
-use gaitwright_service::studies::archive::file::read_through;
+use gaitwright_service::studies::archive::archive_file::read_through;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::archives::exported;
@@ -33,7 +33,7 @@ impl Target {
     async fn set() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| new.trial_budget = 3).await;
+        let study = service.study(|new| new.number_of_trials = 3).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trial = service.trials(study).await[0].id.to_string();
         Self { service, study: study.to_string(), trial, _folder: folder }
@@ -56,7 +56,7 @@ impl Target {
 
     fn path(&self, template: &str) -> String {
         let id = if template.starts_with("/api/v1/trials") { &self.trial } else { &self.study };
-        template.replace("{id}", id).replace("{token}", &"a".repeat(64))
+        template.replace("{id}", id).replace("{code}", &"a".repeat(64))
     }
 }
 
@@ -69,7 +69,7 @@ fn any_json() -> impl Strategy<Value = Value> {
             "trial_b",
             "answer",
             "seed",
-            "trial_budget",
+            "number_of_trials",
             "search_space",
             "dimensions",
             "name",

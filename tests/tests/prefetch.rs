@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::studies::pending_comparison::open_question;
+use gaitwright_service::studies::pending_comparison::pending_comparison;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::attempts;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use serde_json::json;
@@ -18,7 +18,7 @@ use std::time::Duration;
 async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::slow(Duration::from_millis(4)), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (7, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (7, AnswerSource::People)).await;
     loop {
         let present = service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
         if present.state == StudyState::Finished {
@@ -27,8 +27,8 @@ async fn tuned(thinks: Duration) -> (Vec<String>, Vec<String>) {
         tokio::time::sleep(thinks).await;
         let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), present).await.unwrap();
         let there = snapshot.clone();
-        let question = service.store.clone().compute(move |pool| open_question(pool, &there)).await.unwrap();
-        let Some((a, b)) = question.unwrap().trials() else { continue };
+        let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &there)).await.unwrap();
+        let Some((a, b)) = pending.unwrap().trials() else { continue };
         let rmse = |id| snapshot.trial(id).unwrap().gait_rmse_rad.unwrap();
         let answer = json!({"trial_a": a, "trial_b": b, "answer": if rmse(a) < rmse(b) { "a" } else { "b" }});
         let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
@@ -66,7 +66,7 @@ async fn prefetched_solve_gives_way_within_one_iteration() {
     let solver = Analytic::slow(Duration::from_millis(40));
     let made = Arc::clone(&solver.made);
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let human = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let human = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(human, &[StudyState::Waiting]).await;
     let known: HashSet<_> = service.trials(human).await.iter().map(|trial| trial.id).collect();
     let begun = made.lock().unwrap().len();
@@ -75,7 +75,7 @@ async fn prefetched_solve_gives_way_within_one_iteration() {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
 
-    let wanted = service.study(|new| new.trial_budget = 1).await;
+    let wanted = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(wanted, &[StudyState::Finished]).await;
     let wanted = service.trials(wanted).await[0].id;
     let made = made.lock().unwrap().clone();

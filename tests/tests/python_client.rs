@@ -113,7 +113,7 @@ async fn the_programs_of_the_guide_run() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_notebook_plots_a_gait_and_its_rmse() {
     let (_folder, service, address) = service().await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let text = std::fs::read_to_string(repository().join("server/clients/python/gait.ipynb")).unwrap();
     let notebook: Value = serde_json::from_str(&text).unwrap();

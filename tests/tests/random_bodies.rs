@@ -8,11 +8,11 @@ use axum::body::Body;
 use axum::http::{Request, StatusCode, header};
 use gaitwright_http::openapi;
 use gaitwright_service::studies::study_plan::NewStudy;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::{StudyId, SubjectId, TrialId};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::bodies_from_schema::Drawn;
-use gaitwright_tests::measured::{electromyogram, four_strides, motion};
+use gaitwright_tests::measured::{electromyogram, four_strides, joint_angles};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -47,7 +47,7 @@ impl Scene {
     async fn set() -> (TempDir, Self) {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let finished = service.study(|new| (new.trial_budget, new.feedback_mode) = (18, FeedbackMode::Mixed)).await;
+        let finished = service.study(|new| (new.number_of_trials, new.answer_source) = (18, AnswerSource::Both)).await;
         service.wait_for(finished, &[StudyState::Finished]).await;
         // Another subject, so that safety reports there do not affect gaits here.
         let own = service.subject().await;
@@ -55,11 +55,11 @@ impl Scene {
         let ids = subjects.as_array().unwrap().iter().map(|subject| subject["id"].as_str().unwrap().parse().unwrap());
         let other: SubjectId = ids.into_iter().find(|id| *id != own).unwrap();
         let of_another = |new: &mut NewStudy| {
-            (new.subject_id, new.trial_budget, new.feedback_mode) = (other, 40, FeedbackMode::Human);
+            (new.subject_id, new.number_of_trials, new.answer_source) = (other, 40, AnswerSource::People);
         };
         let human = service.study(of_another).await;
         service.wait_for(human, &[StudyState::Waiting]).await;
-        let script = service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 5000)).await;
+        let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 5000)).await;
         let converged = service.trials(finished).await.into_iter().filter(|trial| trial.gait_rmse_rad.is_some());
         let trials = converged.map(|trial| trial.id).collect();
         let router = service.router();
@@ -129,18 +129,18 @@ impl Scene {
     /// The value of the path parameter of an operation: an object in a suitable state.
     async fn target(&mut self, path: &str) -> Option<String> {
         Some(match path {
-            "/blind-pairs/{token}/answer" => {
+            "/blind-pairs/{code}/answer" => {
                 // After an answer, no comparison is pending until the study has chosen the next one.
-                let mut token = None;
+                let mut code = None;
                 for _ in 0..100 {
                     let next = self.post(&format!("/studies/{}/blind-pairs/next", self.human), json!({})).await;
-                    token = next["pair"]["token"].as_str().map(str::to_owned);
-                    if token.is_some() || self.service.get(self.human).await.state == StudyState::Finished {
+                    code = next["pair"]["code"].as_str().map(str::to_owned);
+                    if code.is_some() || self.service.get(self.human).await.state == StudyState::Finished {
                         break;
                     }
                     tokio::time::sleep(Duration::from_millis(50)).await;
                 }
-                token?
+                code?
             }
             "/studies/{id}/start" => self.study(false).await,
             "/studies/{id}/pause" | "/studies/{id}/stop" => self.study(true).await,
@@ -192,7 +192,7 @@ impl Scene {
             *target = self.target(path).await;
         }
         let known = target.as_ref()?;
-        let address = path.replace("{id}", known).replace("{token}", known);
+        let address = path.replace("{id}", known).replace("{code}", known);
         let answer = self.request(method, &address, body).await;
         if answer.status.is_success() {
             *target = None;
@@ -232,8 +232,8 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
             ("recording", vec![json!(electromyogram(1.0))]),
             reading(json!({"heel_strike_column": "heel"})),
         ]),
-        path if path.ends_with("/measurement-files/motion") => {
-            BTreeMap::from([("recording", vec![json!(motion())]), reading(json!({}))])
+        path if path.ends_with("/measurement-files/joint-angles") => {
+            BTreeMap::from([("recording", vec![json!(joint_angles())]), reading(json!({}))])
         }
         path if path.ends_with("/reference-gaits") => BTreeMap::from([
             ("recording", vec![json!(four_strides(100))]),
@@ -270,7 +270,7 @@ async fn bodies_are_accepted_if_and_only_if_they_match_the_description() {
     let mut drawn = Drawn::from(document.clone());
     scene.post("/users", json!({"name": MEMBER, "role": "rater"})).await;
     // A rater exists once a pair was drawn.
-    scene.target("/blind-pairs/{token}/answer").await;
+    scene.target("/blind-pairs/{code}/answer").await;
     let common = known(&scene).await;
     let (mut faults, mut never, mut accepted, mut refused) = (Vec::new(), Vec::new(), 0, 0);
     for (path, item) in document["paths"].as_object().unwrap() {

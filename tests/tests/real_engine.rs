@@ -11,7 +11,7 @@ use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
 use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Evaluate, GaitSolver};
-use gaitwright_store::studies::{FeedbackMode, StudyFilter, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
 use gaitwright_tests::analytic::Analytic;
@@ -111,15 +111,15 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     let output = cli::run(BINARY, folder, &[&sweep[..], &["200", "--muscles", "on"]].concat());
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("it was solved without muscles, but the problem is solved with muscles"), "{text}");
+    assert!(text.contains("the gait has no muscles, but the problem has muscles"), "{text}");
 }
 
 /// The answer of a solve as those that start from it name it.
-fn ancestor(figures: &Value) -> Value {
-    let lineage = &figures["lineage"];
+fn ancestor(report: &Value) -> Value {
+    let lineage = &report["lineage"];
     json!({
-        "id": lineage["id"], "local_optimum": lineage["local_optimum"], "objective": figures["objective"],
-        "gait_rmse_rad": figures["gait_rmse_rad"]
+        "id": lineage["id"], "local_optimum": lineage["local_optimum"], "objective": report["objective"],
+        "gait_rmse_rad": report["gait_rmse_rad"]
     })
 }
 
@@ -177,9 +177,9 @@ fn solver_settings_are_read_from_a_file() {
     std::fs::write(folder.join("solver.json"), r#"{"bound_push": 0.01}"#).unwrap();
     let solve = ["solve", "--json", "--initial-guesses", "1"];
     let gait = |flags: &[&str]| {
-        let figures = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
-        assert_eq!(figures["status"], "converged");
-        figures["lineage"]["id"].as_str().unwrap().to_owned()
+        let report = json_of(&gaitwright(folder, &[&solve[..], flags, &COARSE].concat()));
+        assert_eq!(report["status"], "converged");
+        report["lineage"]["id"].as_str().unwrap().to_owned()
     };
     // The start is nearer to its bounds, so the way is another one, and at least the last bits of where it ends.
     let usual = gait(&[]);
@@ -187,9 +187,9 @@ fn solver_settings_are_read_from_a_file() {
     assert_eq!(gait(&[]), usual);
 }
 
-/// If the output folder is removed during the solve, the figures are still printed.
+/// If the output folder is removed during the solve, the report is still printed.
 #[test]
-fn figures_are_printed_although_the_gait_file_cannot_be_written() {
+fn report_is_printed_although_the_gait_file_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path().join("place");
     std::fs::create_dir(&place).unwrap();
@@ -312,7 +312,7 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
     let mut writer = store.write().await.unwrap();
     built_in_entries::ensure(&mut writer).await.unwrap();
     let subject = subjects::by_pseudonym(&mut writer, "paper-1").await.unwrap().unwrap();
-    let mut new = NewStudy { muscles: false, trial_budget: 2, ..NewStudy::of(subject.id) };
+    let mut new = NewStudy { muscles: false, number_of_trials: 2, ..NewStudy::of(subject.id) };
     change(&mut new);
     let study = study_plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), new).await.unwrap();
     commit(writer).await.unwrap();
@@ -327,7 +327,7 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
 async fn tune_continues_an_interrupted_study_and_ignores_studies_of_another_kind() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("gaitwright.db");
-    let of_people = study_in(&database, |new| new.feedback_mode = FeedbackMode::Human).await;
+    let of_people = study_in(&database, |new| new.answer_source = AnswerSource::People).await;
     let coarser = study_in(&database, |new| new.gait_settings.mesh.ss2 += 1).await;
     let shorter = study_in(&database, |new| new.solve_options.max_iterations = 7).await;
     let tighter = study_in(&database, |new| new.base_bounds.a1 = 19.0).await;
@@ -379,7 +379,7 @@ async fn failed_trial_sets_the_exit_code() {
     let database = folder.path().join("gaitwright.db");
     let solver = Analytic { panics: vec![1], ..Analytic::slow(Duration::from_millis(300)) };
     let service = Service::start(&database, solver, 1).await;
-    let study = service.study(|new| (new.muscles, new.trial_budget) = (false, 2)).await;
+    let study = service.study(|new| (new.muscles, new.number_of_trials) = (false, 2)).await;
     until("a second trial", async || service.trials(study).await.len() == 2).await;
     assert_eq!(service.trials(study).await[0].state, TrialState::Failed);
     service.stop().await;

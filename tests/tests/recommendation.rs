@@ -5,7 +5,7 @@
 use axum::http::StatusCode;
 use gait_learner::{Agreement, SearchSpace, posterior};
 use gait_optimizer::{Gait, TunedBounds};
-use gaitwright_service::studies::belief::{Belief, Beliefs};
+use gaitwright_service::studies::analysis::{Analyses, Analysis};
 use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -15,7 +15,7 @@ use gaitwright_service::studies::utility_history::UtilityPoint;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::feedback::Source;
 use gaitwright_store::gaits;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId, certificates, commit};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
@@ -46,7 +46,7 @@ async fn study_without_a_gait_has_no_recommendation() {
     let space = json!({"dimensions": [{"name": "a1", "values": [15.0, 20.0], "lengthscale": 5.0}]});
     let space: SearchSpace = serde_json::from_value(space).unwrap();
     let plan = |new: &mut NewStudy| {
-        (new.base_bounds, new.search_space, new.trial_budget) = (without_gait, Some(space.clone().into()), 2);
+        (new.base_bounds, new.search_space, new.number_of_trials) = (without_gait, Some(space.clone().into()), 2);
     };
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -59,7 +59,7 @@ async fn study_without_a_gait_has_no_recommendation() {
     assert_eq!(service.fetch(&format!("{api}/recommendation")).await.status, StatusCode::CONFLICT);
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(!page.contains("data-best") && !page.contains(">best<"), "{page}");
-    // The figures of a last iterate are not those of a gait.
+    // The values of a last iterate are not those of a gait.
     assert!(trials.iter().all(|trial| trial.report.is_some() && trial.gait_rmse_rad.is_none()), "{trials:?}");
     let table = service.fetch(&format!("{api}/trials.csv")).await.text;
     let column = table.lines().next().unwrap().split(',').position(|name| name == "gait_rmse_rad").unwrap();
@@ -77,7 +77,7 @@ async fn study_without_a_gait_has_no_recommendation() {
 async fn recommendation_states_a_failed_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 6).await;
+    let study = service.study(|new| new.number_of_trials = 6).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let page = format!("/studies/{study}");
 
@@ -119,7 +119,7 @@ async fn recommendation_states_a_failed_certificate() {
 async fn recommendation_states_a_passed_certificate() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let best = ranked(&service, study).await[0];
     certified(&service, best, true).await;
@@ -150,14 +150,14 @@ async fn settled(service: &Service, study: StudyId) -> Value {
 async fn ranked(service: &Service, study: StudyId) -> Vec<TrialId> {
     let study = service.get(study).await;
     let snapshot = StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap();
-    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &snapshot, &Beliefs::default())).await;
+    let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &snapshot, &Analyses::default())).await;
     rank.unwrap().unwrap()
 }
 
 /// The trials whose gaits the service certified by itself, in order.
 async fn certified_by_service(service: &Service) -> Vec<String> {
     let mut trail = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    trail.retain(|row| row.action == "trial.certify" && row.actor == Actor::program().as_str());
+    trail.retain(|row| row.change == "trial.certify" && row.actor == Actor::program().as_str());
     trail.iter().rev().map(|row| row.object.clone()).collect()
 }
 
@@ -165,7 +165,7 @@ async fn certified_by_service(service: &Service) -> Vec<String> {
 async fn ended_study_certifies_its_ten_best_gaits_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start_certifying(&folder.path().join("a.db"), Analytic::default(), only(None)).await;
-    let study = service.study(|new| new.trial_budget = 20).await;
+    let study = service.study(|new| new.number_of_trials = 20).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let early = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert!(early.status == StatusCode::CONFLICT && early.text.contains("being certified"), "{}", early.text);
@@ -185,7 +185,7 @@ async fn studies_that_ended_before_a_restart_are_certified_until_one_gait_passes
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start_without_certificates(&database, Analytic::default()).await;
-    let study = service.study(|new| new.trial_budget = 12).await;
+    let study = service.study(|new| new.number_of_trials = 12).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let best = ranked(&service, study).await;
     let third = service.trials(study).await.into_iter().find(|trial| trial.id == best[2]).unwrap();
@@ -216,7 +216,7 @@ async fn requested_recommendation_of_a_running_study_is_certified_during_its_sol
     let solver = Analytic::slow(Duration::from_millis(20));
     let passes = Verdicts { pause: Duration::from_millis(20), passes: |_: &Gait| true };
     let service = Service::start_certifying(&folder.path().join("a.db"), solver, passes).await;
-    let study = service.study(|new| new.trial_budget = 500).await;
+    let study = service.study(|new| new.number_of_trials = 500).await;
     service.wait_for_trials(study, 3).await;
     assert!(certified_by_service(&service).await.is_empty(), "nobody asked");
     service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
@@ -237,24 +237,24 @@ async fn snapshot(service: &Service, study: StudyId) -> StudySnapshot {
     StudySnapshot::read(&mut service.store.read().await.unwrap(), study).await.unwrap()
 }
 
-async fn utility_history(service: &Service, study: StudyId, beliefs: &Arc<Beliefs>) -> Vec<UtilityPoint> {
-    let (snapshot, beliefs) = (snapshot(service, study).await, Arc::clone(beliefs));
-    service.store.clone().compute(move |pool| beliefs.utility_history(pool, &snapshot)).await.unwrap().unwrap()
+async fn utility_history(service: &Service, study: StudyId, analyses: &Arc<Analyses>) -> Vec<UtilityPoint> {
+    let (snapshot, analyses) = (snapshot(service, study).await, Arc::clone(analyses));
+    service.store.clone().compute(move |pool| analyses.utility_history(pool, &snapshot)).await.unwrap().unwrap()
 }
 
 #[tokio::test]
 async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
-    let beliefs = Arc::new(Beliefs::default());
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
+    let analyses = Arc::new(Analyses::default());
     for answers in 0..5 {
         users::asked(&service, study).await;
-        assert_eq!(utility_history(&service, study, &beliefs).await.len(), answers);
+        assert_eq!(utility_history(&service, study, &analyses).await.len(), answers);
         users::answer_once(&service, study).await;
     }
     users::asked(&service, study).await;
-    let points = utility_history(&service, study, &beliefs).await;
+    let points = utility_history(&service, study, &analyses).await;
     assert_eq!(points.iter().map(|point| point.answers).collect::<Vec<_>>(), [1, 2, 3, 4, 5]);
     // The points that were kept are those that a new cache computes.
     assert_eq!(points, utility_history(&service, study, &Arc::default()).await);
@@ -277,7 +277,7 @@ async fn utility_history_has_the_posterior_after_each_answer_of_a_person() {
     let first = now.feedback.iter().find(|row| row.source == Source::Clinician).unwrap().id;
     let retracted = service.post(&format!("/api/v1/preferences/{first}/retract"), &json!({"reason": "a slip"})).await;
     assert!(retracted.status.is_success(), "{}", retracted.text);
-    let fewer = utility_history(&service, study, &beliefs).await;
+    let fewer = utility_history(&service, study, &analyses).await;
     assert_eq!(fewer.len(), 4);
     assert_eq!(fewer, utility_history(&service, study, &Arc::default()).await);
     service.stop().await;
@@ -288,16 +288,16 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let plan = |new: &mut NewStudy| {
-        (new.trial_budget, new.feedback_mode, new.repeat_results) = (6, FeedbackMode::Mixed, Some(true));
+        (new.number_of_trials, new.answer_source, new.repeat_results) = (6, AnswerSource::Both, Some(true));
         new.search_space = Some(inactive_bound().into());
     };
     let study = service.study(plan).await;
     service.wait_for(study, &[StudyState::Finished]).await;
-    let belief = async || {
-        let (snapshot, beliefs) = (snapshot(&service, study).await, Beliefs::default());
-        service.store.clone().compute(move |pool| beliefs.of(pool, &snapshot)).await.unwrap().unwrap()
+    let analysis = async || {
+        let (snapshot, analyses) = (snapshot(&service, study).await, Analyses::default());
+        service.store.clone().compute(move |pool| analyses.of(pool, &snapshot)).await.unwrap().unwrap()
     };
-    let before = belief().await;
+    let before = analysis().await;
     let trials = service.trials(study).await;
     let pooled: Vec<TrialId> = before.gaits.iter().flat_map(|gait| gait.trials.clone()).collect();
     assert_eq!(pooled.len(), trials.len(), "each trial is in one row");
@@ -308,11 +308,12 @@ async fn analysis_pools_identical_gaits_and_lists_only_answers_that_the_learner_
         assert!(before.gaits[..place].iter().all(|other| !is_same_gait(find(other.trials[0]), find(gait.trials[0]))));
     }
     assert!(before.gaits.windows(2).all(|pair| pair[0].utility.mean >= pair[1].utility.mean));
-    assert!(before.unexpected_answers.iter().all(|unexpected| unexpected.probability.is_none_or(|p| p < 0.5)));
-    let doubted = |belief: &Belief| {
-        let Agreement { comparisons, comparisons_agreeing, ties, ties_agreeing, .. } = belief.agreement;
-        comparisons - comparisons_agreeing + ties - ties_agreeing
+    assert!(before.surprising_answers.iter().all(|surprising| surprising.probability.is_none_or(|p| p < 0.5)));
+    let doubted = |analysis: &Analysis| {
+        let Agreement { comparisons, comparisons_agreeing, no_difference, no_difference_agreeing, .. } =
+            analysis.agreement;
+        comparisons - comparisons_agreeing + no_difference - no_difference_agreeing
     };
-    assert_eq!(before.unexpected_answers.len(), doubted(&before));
+    assert_eq!(before.surprising_answers.len(), doubted(&before));
     service.stop().await;
 }

@@ -63,7 +63,7 @@ async fn repeated_request_has_one_effect_and_the_same_response() {
     );
     assert_eq!(post_with_key(&service, "/api/v1/subjects", "key-2", &other).await.status, StatusCode::CREATED);
 
-    let study = json!({"subject_id": first.json()["id"], "trial_budget": 1, "start": false});
+    let study = json!({"subject_id": first.json()["id"], "number_of_trials": 1, "start": false});
     let made = post_with_key(&service, "/api/v1/studies", "key-3", &study).await;
     assert_eq!(post_with_key(&service, "/api/v1/studies", "key-3", &study).await.text, made.text);
     assert_eq!(service.fetch("/api/v1/studies").await.items().as_array().unwrap().len(), 1);
@@ -77,10 +77,10 @@ async fn repeated_request_has_one_effect_and_the_same_response() {
 async fn every_change_writes_exactly_one_row_of_the_audit_trail() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
-    let held = service.study(|new| (new.trial_budget, new.start) = (3, false)).await;
+    let held = service.study(|new| (new.number_of_trials, new.start) = (3, false)).await;
     let answer = json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "a"});
     let given = service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await.json();
     let form = "application/x-www-form-urlencoded";
@@ -144,7 +144,7 @@ async fn audit_verify_finds_one_changed_byte_of_the_audit_trail() {
 #[tokio::test]
 async fn evidence_tables_are_append_only_for_other_programs() {
     let (folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
     let pool = intruder(&folder.path().join("a.db")).await;
@@ -248,7 +248,7 @@ async fn newer_schema_is_refused_and_unchanged() {
 #[tokio::test]
 async fn backup_of_a_running_service_is_complete_and_usable() {
     let (folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 10).await;
+    let study = service.study(|new| new.number_of_trials = 10).await;
     service.wait_for_trials(study, 3).await;
     let copy = folder.path().join("copy.db");
     backup::of_file(&folder.path().join("a.db"), &copy).await.unwrap();

@@ -34,7 +34,7 @@ async fn gait_rmse_is_not_compared_between_studies_with_different_reference_gait
     assert_eq!(all[1]["name"], "Fukuchi 2018, median of 24 adults");
     let mut studies = Vec::new();
     for reference in [ids[0], ids[0], ids[1]] {
-        let study = service.study(|new| (new.reference_gait_id, new.trial_budget) = (Some(reference), 2)).await;
+        let study = service.study(|new| (new.reference_gait_id, new.number_of_trials) = (Some(reference), 2)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         studies.push(study);
     }
@@ -76,7 +76,7 @@ async fn imported_recording_becomes_the_reference_of_a_study() {
     assert!(matches[0]["distance"].as_f64().unwrap() < 0.2 && matches[2]["distance"].is_null(), "{matches}");
 
     let id: gaitwright_store::ReferenceGaitId = near["id"].as_str().unwrap().parse().unwrap();
-    let study = service.study(|new| (new.reference_gait_id, new.trial_budget) = (Some(id), 1)).await;
+    let study = service.study(|new| (new.reference_gait_id, new.number_of_trials) = (Some(id), 1)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0).id;
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
@@ -204,7 +204,7 @@ fn between(rows: &[Vec<f64>], column: usize, time: f64) -> f64 {
 #[tokio::test]
 async fn exported_gait_table_is_imported_as_the_same_curves() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0).id;
     let table = service.fetch(&format!("/api/v1/trials/{trial}/gait.csv")).await.text;
@@ -244,7 +244,7 @@ async fn import_does_not_change_the_reference_gait_of_new_studies() {
     let (_folder, service) = service().await;
     let near = service.post("/api/v1/reference-gaits", &new("near", 1.72)).await.json();
     let far = service.post("/api/v1/reference-gaits", &new("far", 2.0)).await.json();
-    let form = "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on";
+    let form = "muscles=on&answer_source=gait_rmse&number_of_trials=1&parallel_trials=1&seed=1&tuned_a5=on";
     let kind = "application/x-www-form-urlencoded";
     let known = format!("{form}&subject={}&reference_gait=", service.subject().await);
     let tall = format!("{form}&subject=new&pseudonym=S09&height_m=1.98&body_mass_kg=66&reference_gait=");

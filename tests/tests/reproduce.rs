@@ -36,8 +36,9 @@ async fn failed_trials_are_reported_with_their_own_exit_code() {
     let solver = Analytic { panics: vec![2], ..Analytic::default() };
     let service = Service::start(&out.join("studies.db"), solver, 1).await;
     for muscles in [false, true] {
-        let study =
-            service.study(|new| (new.trial_budget, new.muscles, new.repeat_results) = (3, muscles, Some(true))).await;
+        let study = service
+            .study(|new| (new.number_of_trials, new.muscles, new.repeat_results) = (3, muscles, Some(true)))
+            .await;
         service.wait_for(study, &[StudyState::Finished]).await;
     }
     service.stop().await;
@@ -70,8 +71,9 @@ async fn report_has_a_deviation_band_or_states_that_it_has_none() {
             commit(writer).await.unwrap();
         }
         for muscles in [false, true] {
-            let study =
-                service.study(|new| (new.trial_budget, new.muscles, new.reference_gait_id) = (3, muscles, id)).await;
+            let study = service
+                .study(|new| (new.number_of_trials, new.muscles, new.reference_gait_id) = (3, muscles, id))
+                .await;
             service.wait_for(study, &[StudyState::Finished]).await;
         }
         service.stop().await;

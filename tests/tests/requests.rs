@@ -64,7 +64,7 @@ async fn change_with_an_outdated_revision_is_refused() {
 #[tokio::test]
 async fn event_listener_with_an_unknown_last_id_receives_new_events() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| new.trial_budget = 2).await;
+    let study = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let request = |seen: &str| {
         let path = format!("/api/v1/studies/{study}/events");
@@ -76,7 +76,7 @@ async fn event_listener_with_an_unknown_last_id_receives_new_events() {
         String::from_utf8(frame.into_data().unwrap().to_vec()).unwrap()
     };
     assert!(next().await.contains("event: study_state"));
-    let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"trial_budget": 3})).await;
+    let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"number_of_trials": 3})).await;
     assert_eq!(extended.status, StatusCode::OK);
     assert!(next().await.contains("event: study_changed"));
     let garbled = service.send(request("the last one")).await;
@@ -103,7 +103,13 @@ async fn field_of_the_wrong_type_is_refused_with_its_value_and_the_expected_type
     let (_folder, service) = service().await;
     let subject = service.subject().await;
     for (path, body, field, value, allowed) in [
-        ("studies", json!({"subject_id": subject, "trial_budget": "x"}), "trial_budget", json!("x"), "a whole number"),
+        (
+            "studies",
+            json!({"subject_id": subject, "number_of_trials": "x"}),
+            "number_of_trials",
+            json!("x"),
+            "a whole number",
+        ),
         ("studies", json!({"subject_id": subject, "seed": -1}), "seed", json!(-1), "a whole number of at least 0"),
         ("studies", json!({"subject_id": subject, "muscles": 3}), "muscles", json!(3), "true or false"),
         ("studies", json!({}), "subject_id", Value::Null, "present"),

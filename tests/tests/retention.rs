@@ -28,7 +28,7 @@ async fn counts(service: &Service) -> Vec<(String, i64)> {
 async fn only_expired_keys_sessions_and_links_are_deleted() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let body = r#"{"pseudonym": "S1", "height_m": 1.7, "body_mass_kg": 65}"#;
     for key in ["old", "new"] {

@@ -25,7 +25,7 @@ async fn health_responds_while_eight_requests_compute() {
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
     let (one, other) =
-        (service.study(|new| new.trial_budget = 3).await, service.study(|new| new.trial_budget = 3).await);
+        (service.study(|new| new.number_of_trials = 3).await, service.study(|new| new.number_of_trials = 3).await);
     for study in [one, other] {
         service.wait_for(study, &[StudyState::Finished]).await;
     }
@@ -186,7 +186,7 @@ async fn service_is_not_ready_while_the_record_accepts_no_changes() {
 async fn low_disk_space_stops_new_studies_but_not_answers() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = json!({"subject_id": service.subject().await, "muscles": false, "trial_budget": 2});
+    let study = json!({"subject_id": service.subject().await, "muscles": false, "number_of_trials": 2});
     service.store.set_reserve(u64::MAX);
     let answer = service.post("/api/v1/studies", &study).await;
     assert_eq!(answer.status, StatusCode::INSUFFICIENT_STORAGE, "{}", answer.text);
@@ -255,7 +255,7 @@ async fn panicking_task_is_reported_and_restarted() {
     assert!(seen.text.contains("listening to workers") && seen.text.contains("the engine broke"), "{}", seen.text);
     broken.store(false, Ordering::SeqCst);
     // A study runs to its end after the task was restarted.
-    let study = service.study(|new| new.trial_budget = 2).await;
+    let study = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
 }
@@ -265,7 +265,7 @@ async fn study_page_with_7300_answers_stays_small_and_fast() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
     large::answer_often(&database, study, 7300).await;
@@ -292,7 +292,7 @@ async fn study_page_with_300_trials_weighs_less_than_150_kb() {
     let folder = tempfile::tempdir().unwrap();
     let database = folder.path().join("a.db");
     let service = Service::start(&database, Analytic::default(), 1).await;
-    let study = service.study(|new| new.trial_budget = 3).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     service.stop().await;
     large::fill_to(&database, study, 300).await;
@@ -326,8 +326,7 @@ async fn study_form_is_checked_while_another_change_holds_the_writer() {
     for (subject, accepted) in
         [(described, true), ("subject=new&pseudonym=paper-1&height_m=1.8&body_mass_kg=70", false)]
     {
-        let form =
-            "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=";
+        let form = "muscles=on&answer_source=gait_rmse&number_of_trials=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=";
         let body = format!("{form}&{subject}");
         let asked = service.post_text("/studies/new/check", "application/x-www-form-urlencoded", &body);
         let answer = tokio::time::timeout(Duration::from_secs(5), asked).await.expect("it waits for the writer");

@@ -11,7 +11,7 @@ use gaitwright_service::studies::lab;
 use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{DeviceId, StudyId, TokenId, commit};
 use gaitwright_tests::callers::FORM;
@@ -29,7 +29,7 @@ async fn service() -> (TempDir, Service) {
 }
 
 async fn finished(service: &Service) -> (StudyId, Vec<Trial>) {
-    let study = service.study(|new| new.trial_budget = 12).await;
+    let study = service.study(|new| new.number_of_trials = 12).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     (study, converged(service, study).await)
 }
@@ -96,7 +96,7 @@ async fn report_covers_every_trial_of_the_subject_with_the_same_motion() {
 async fn report_covers_every_trial_with_equal_bounds_if_a_lab_script_evaluated_one() {
     let (_folder, service) = service().await;
     let device = another_device(&service).await;
-    let by_script = |new: &mut NewStudy| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3);
+    let by_script = |new: &mut NewStudy| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 3);
     let (first, second) = (service.study(by_script).await, service.study(by_script).await);
     let on_another = service
         .study(|new| {
@@ -104,7 +104,7 @@ async fn report_covers_every_trial_with_equal_bounds_if_a_lab_script_evaluated_o
             new.device_id = Some(device);
         })
         .await;
-    let computed = service.study(|new| new.trial_budget = 3).await;
+    let computed = service.study(|new| new.number_of_trials = 3).await;
     service.wait_for(computed, &[StudyState::Finished]).await;
     let reported = scripted::trial(&service, first).await;
     let mut others = vec![scripted::trial(&service, second).await, scripted::trial(&service, on_another).await];
@@ -134,7 +134,7 @@ async fn report_covers_every_trial_with_equal_bounds_if_a_lab_script_evaluated_o
 #[tokio::test]
 async fn lab_script_does_not_receive_bounds_of_unsafe_gaits() {
     let (_folder, service) = service().await;
-    let by_script = |new: &mut NewStudy| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3);
+    let by_script = |new: &mut NewStudy| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 3);
     let (first, second, third) =
         (service.study(by_script).await, service.study(by_script).await, service.study(by_script).await);
     let ask = async |study: StudyId| service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await;
@@ -270,17 +270,17 @@ async fn report_stops_a_controller_file_that_waits_for_the_access_log() {
 #[tokio::test]
 async fn pair_is_no_longer_shown_to_its_rater_after_a_report() {
     let (_folder, service) = service().await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let token = pair["pair"]["token"].as_str().unwrap();
-    let motion = format!("/api/v1/blind-pairs/{token}/motions/first");
+    let code = pair["pair"]["code"].as_str().unwrap();
+    let motion = format!("/api/v1/blind-pairs/{code}/motions/first");
     assert_eq!(service.fetch(&motion).await.status, StatusCode::OK);
     for trial in converged(&service, study).await {
         report(&service, &trial).await;
     }
     assert_eq!(service.fetch(&motion).await.status, StatusCode::CONFLICT);
-    assert_eq!(service.fetch(&format!("/rate/pair/{token}")).await.status, StatusCode::CONFLICT);
+    assert_eq!(service.fetch(&format!("/rate/pair/{code}")).await.status, StatusCode::CONFLICT);
     service.stop().await;
 }
 

@@ -5,7 +5,7 @@
 use axum::http::StatusCode;
 use gaitwright_store::blind_pairs::{self, OrderedAnswer};
 use gaitwright_store::safety_reviews::{self, SafetyDecision};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{Store, StudyId, TrialId, audit, lab_sessions};
 use gaitwright_tests::analytic::Analytic;
@@ -15,10 +15,10 @@ use serde_json::{Value, json};
 use sqlx::SqlitePool;
 use sqlx::sqlite::SqliteConnectOptions;
 
-async fn started(mode: FeedbackMode, budget: u32) -> (tempfile::TempDir, Service, StudyId) {
+async fn started(source: AnswerSource, trials: u32) -> (tempfile::TempDir, Service, StudyId) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (budget, mode)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (trials, source)).await;
     service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await;
     (folder, service, study)
 }
@@ -43,9 +43,9 @@ async fn waits_at_home(service: &Service) -> bool {
 
 #[tokio::test]
 async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
-    let (_folder, service, study) = started(FeedbackMode::Human, 4).await;
+    let (_folder, service, study) = started(AnswerSource::People, 4).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();
-    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["token"].as_str().unwrap());
+    let answer = format!("/api/v1/blind-pairs/{}/answer", pair["pair"]["code"].as_str().unwrap());
     assert_eq!(service.post(&answer, &json!({"answer": "unsafe_second"})).await.status, StatusCode::OK);
     let said = safety_reports(&service, study).await;
     assert_eq!(said.len(), 1, "{said:?}");
@@ -85,7 +85,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
     assert_eq!(called_unsafe, Some(vec![gait.parse().unwrap()]));
     let trail = audit::page(&mut reader, "", None, 100).await.unwrap();
     drop(reader);
-    let reviews: Vec<_> = trail.iter().filter(|row| row.action == "gait.review").collect();
+    let reviews: Vec<_> = trail.iter().filter(|row| row.change == "gait.review").collect();
     assert_eq!(reviews.len(), 2);
     assert!(reviews.iter().any(|row| row.detail.to_string().contains("the video was cut")));
     let feedback = service.feedback(study).await;
@@ -103,7 +103,7 @@ async fn staff_clear_a_rater_report_and_it_stays_in_the_record() {
 
 #[tokio::test]
 async fn gait_cleared_by_staff_is_recommended_again() {
-    let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
+    let (_folder, service, study) = started(AnswerSource::GaitRmse, 6).await;
     let recommended = async || service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let best = recommended().await["trial_id"].clone();
     let other = converged(&service, study).await.into_iter().find(|id| json!(id) != best).unwrap();
@@ -150,7 +150,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
 
 #[tokio::test]
 async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
-    let (_folder, service, study) = started(FeedbackMode::Automatic, 6).await;
+    let (_folder, service, study) = started(AnswerSource::GaitRmse, 6).await;
     let gaits = converged(&service, study).await;
     let sessions = format!("/api/v1/studies/{study}/lab-sessions");
     let plan = json!({"trial_a": gaits[0], "trial_b": gaits[1]});
@@ -178,7 +178,7 @@ async fn cleared_report_of_a_walk_needs_another_review_after_unblinding() {
 
 #[tokio::test]
 async fn renumbered_rows_keep_the_order_of_reviews() {
-    let (_folder, service, study) = started(FeedbackMode::Automatic, 4).await;
+    let (_folder, service, study) = started(AnswerSource::GaitRmse, 4).await;
     let gait = converged(&service, study).await[0];
     service.post(&format!("/api/v1/trials/{gait}/safety-reports"), &json!({"note": "stumbled"})).await;
     for decision in ["unsafe", "cleared"] {

@@ -73,7 +73,7 @@ async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted()
         ("update users set role = 'administrator'", "users"),
         (
             "insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at) \
-             select 'x', study_id, 'tie', min(id), max(id), 'subject', 'K', '' from trials group by study_id",
+             select 'x', study_id, 'no_difference', min(id), max(id), 'subject', 'K', '' from trials group by study_id",
             "feedback",
         ),
     ] {
@@ -126,7 +126,7 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
         ("lab_session_steps", "step") => "'closed'".to_owned(),
         ("blind_pairs" | "trials" | "lab_sessions", "number") => format!("{column} + 1000"),
         (_, "hash" | "token") => "hex(randomblob(32))".to_owned(),
-        ("feedback", "kind") => "'tie'".to_owned(),
+        ("feedback", "kind") => "'no_difference'".to_owned(),
         (_, "id" | "sha256" | "pseudonym" | "name") | ("jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
         (_, column) if column == last => "hex(randomblob(8))".to_owned(),
         (_, column) => column.to_owned(),

@@ -63,9 +63,9 @@ async fn start_anew(database: &Path) -> Service {
     Service::start(database, Analytic::default(), 1).await
 }
 
-async fn trail(service: &Service, action: &str) -> Vec<AuditRow> {
+async fn trail(service: &Service, change: &str) -> Vec<AuditRow> {
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1000).await.unwrap();
-    rows.into_iter().filter(|row| row.action == action).collect()
+    rows.into_iter().filter(|row| row.change == change).collect()
 }
 
 /// Attempts that were started and never finished, as when the client disconnects.
@@ -133,7 +133,7 @@ async fn change_is_refused_if_rights_or_consent_end_before_its_body_is_complete(
     let (_folder, mut service) = service().await;
     service.access = Arc::new(AccessState::by_sign_in(3600.0));
     let root = signed_in(&service, Role::Administrator).await;
-    let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    let study = service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
     let (id, link) = user(&service, "Eve", Role::Administrator).await;
     let mut writer = service.store.write().await.unwrap();
     let (_, session) = sign_in::with_link(&mut writer, &link).await.unwrap();
@@ -346,7 +346,7 @@ async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
     abort_attempts(&service, "192.0.2.66", (0..30_000).map(|_| "admin".to_owned())).await;
     let page = send(&service, &admin, &Method::GET, "/users", "", "").await.text;
     assert!(page.contains("192.0.2.66") && page.contains("30000"), "{page}");
-    let noted = trail(&service, "session.wait").await;
+    let noted = trail(&service, "sign_in.delay").await;
     assert_eq!(noted[0].detail["failed_attempts_of_network"], 20_000);
     assert!(noted.len() < 20, "{}", noted.len());
 
@@ -356,7 +356,7 @@ async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
     let tomorrow = now().plus_seconds(25 * 3600);
     let _ = back_off::begin(&mut writer, tomorrow, "Ada", origin).await.unwrap();
     commit(writer).await.unwrap();
-    let forgotten = trail(&service, "session.refused").await;
+    let forgotten = trail(&service, "sign_in.failures").await;
     assert_eq!(
         (&forgotten[0].detail["network"], &forgotten[0].detail["failed_attempts"]),
         (&json!("192.0.2.66"), &json!(30_000))
@@ -644,7 +644,7 @@ async fn event_streams_end_when_their_authorization_ends() {
     service.access = access(LIMITS, &offset);
     let admin = with_password(&service, "Ada", Role::Administrator, RIGHT).await;
     let root = session_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await);
-    let study = service.study(|new| (new.trial_budget, new.start) = (2, false)).await;
+    let study = service.study(|new| (new.number_of_trials, new.start) = (2, false)).await;
     let path = format!("/api/v1/studies/{study}/events");
     let users = ["signed out", "ended", "disabled", "demoted", "idle"];
     let mut ids = Vec::new();
@@ -699,7 +699,7 @@ fn one_module_creates_event_streams_and_checks_the_caller() {
     let makes = |text: &str| ["Sse::new", "Body::from_stream", "StreamBody"].iter().any(|way| text.contains(way));
     let makers: Vec<&str> = found.iter().filter(|(_, text)| makes(text)).map(|(path, _)| path.as_str()).collect();
     // An archive is a finite response, and the other file changes requests.
-    let finite = ["http/src/api/archive.rs", "http/src/request_body.rs"];
+    let finite = ["http/src/api/study_archives.rs", "http/src/request_body.rs"];
     let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| finite.contains(path));
     assert_eq!(files.len(), 2);
     assert!(found.len() > 100 && makers.len() == 1 && makers[0] == "http/src/event_stream.rs", "{makers:?}");

@@ -8,7 +8,7 @@
 use axum::body::Body;
 use axum::http::Request;
 use gaitwright_http::openapi;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -27,7 +27,7 @@ impl Scene {
     async fn set() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-        let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Mixed)).await;
+        let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::Both)).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let mut trials = service.trials(study).await;
         trials.retain(|trial| trial.state == TrialState::Converged);
@@ -63,7 +63,7 @@ impl Scene {
         let start = path.split('/').nth(3).unwrap_or_default();
         let id = self.ids.get(start).map_or(UNKNOWN, String::as_str);
         path.replace("{id}", id)
-            .replace("{token}", &"0".repeat(64))
+            .replace("{code}", &"0".repeat(64))
             .replace("{file}", "a.svg")
             .replace("{side}", "first")
     }
@@ -131,7 +131,7 @@ async fn described_refusals_occur() {
             let address = scene.address(path);
             let schema = &operation["requestBody"]["content"]["application/json"]["schema"];
             let example = scene.example("", schema).to_string();
-            let unknown = path.replace("{id}", UNKNOWN).replace("{token}", "unknown").replace("{side}", "first");
+            let unknown = path.replace("{id}", UNKNOWN).replace("{code}", "unknown").replace("{side}", "first");
             let unknown = unknown.replace("{file}", "a.svg");
             for status in operation["responses"].as_object().unwrap().keys() {
                 let got = match status.as_str() {

@@ -8,11 +8,11 @@ use axum::http::{Method, Request, StatusCode, header};
 use gaitwright_http::openapi;
 use gaitwright_service::access::{Right, Role};
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, audit};
 use gaitwright_tests::callers::{As, FORM, member, send, service, signed_in, token};
-use gaitwright_tests::measured::motion;
+use gaitwright_tests::measured::joint_angles;
 use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
@@ -31,7 +31,7 @@ struct Closed {
     service: Service,
     admin: As,
     study: StudyId,
-    /// By the start of the address: what stands for `{id}` or `{token}` there.
+    /// By the start of the address: what stands for `{id}` or `{code}` there.
     names: BTreeMap<&'static str, String>,
 }
 
@@ -54,7 +54,7 @@ impl Closed {
         let (folder, service) = service().await;
         let admin = signed_in(&service, Role::Administrator).await;
         let set_up = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
-            (new.name, new.feedback_mode, new.trial_budget) = (Some(NAME.to_owned()), FeedbackMode::Mixed, 30);
+            (new.name, new.answer_source, new.number_of_trials) = (Some(NAME.to_owned()), AnswerSource::Both, 30);
         };
         let study = service.study(set_up).await;
         service.wait_for(study, &[StudyState::Finished]).await;
@@ -70,10 +70,14 @@ impl Closed {
         let session = post(&service, &admin, &format!("{api}/lab-sessions"), &session).await;
         let session = session["id"].as_str().unwrap().to_owned();
         post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
-        let measured = json!({"walk": 1, "recording": motion()});
-        let brought =
-            post(&service, &admin, &format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &measured)
-                .await;
+        let measured = json!({"walk": 1, "recording": joint_angles()});
+        let brought = post(
+            &service,
+            &admin,
+            &format!("/api/v1/lab-sessions/{session}/measurement-files/joint-angles"),
+            &measured,
+        )
+        .await;
         member(&service, study, MemberKind::User, "a administrator").await;
         put(&service, &admin, &format!("{api}/access"), &json!({"restricted": true})).await;
         let listed = send(&service, &admin, &Method::GET, &format!("{api}/members"), "", "").await.items();
@@ -151,7 +155,7 @@ async fn call(service: &Service, who: &As, method: &Method, path: &str, id: &str
 /// The newest row of the audit trail.
 async fn newest_act(service: &Service) -> String {
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
-    format!("{} {}", rows[0].seq, rows[0].action)
+    format!("{} {}", rows[0].seq, rows[0].change)
 }
 
 #[tokio::test]
@@ -256,7 +260,7 @@ async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
 async fn lists_show_a_restricted_study_to_members_only() {
     let closed = Closed::new().await;
     let service = &closed.service;
-    let open = service.study(|new| new.trial_budget = 2).await;
+    let open = service.study(|new| new.number_of_trials = 2).await;
     service.wait_for(open, &[StudyState::Finished]).await;
     let outsiders = closed.outsiders().await;
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
@@ -315,7 +319,7 @@ async fn lists_show_a_restricted_study_to_members_only() {
 /// A study that asks people, and a rater who is not assigned to it.
 async fn asking() -> (TempDir, Service, StudyId, As) {
     let (folder, service) = service().await;
-    let study = service.study(|new| (new.feedback_mode, new.trial_budget) = (FeedbackMode::Human, 6)).await;
+    let study = service.study(|new| (new.answer_source, new.number_of_trials) = (AnswerSource::People, 6)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let rater = signed_in(&service, Role::Rater).await;
     (folder, service, study, rater)
@@ -344,11 +348,11 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
     let list = send(&service, &rater, &Method::GET, "/rate", "", "").await;
     assert!(list.text.contains(&format!("/rate/{study}")), "{}", list.text);
     let pair = post(&service, &rater, &next, &json!({})).await;
-    let token = pair["pair"]["token"].as_str().unwrap().to_owned();
+    let code = pair["pair"]["code"].as_str().unwrap().to_owned();
     let addresses = [
-        (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/first")),
-        (Method::GET, format!("/api/v1/blind-pairs/{token}/motions/second")),
-        (Method::GET, format!("/rate/pair/{token}")),
+        (Method::GET, format!("/api/v1/blind-pairs/{code}/motions/first")),
+        (Method::GET, format!("/api/v1/blind-pairs/{code}/motions/second")),
+        (Method::GET, format!("/rate/pair/{code}")),
     ];
     for (method, path) in &addresses {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::OK, "{path}");
@@ -359,8 +363,8 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
     post(&service, &clinician, &remove, &json!({})).await;
     let twice = send(&service, &clinician, &Method::POST, &remove, JSON, "{}").await;
     assert_eq!(twice.status, StatusCode::CONFLICT, "{}", twice.text);
-    let (answer, body) = (format!("/api/v1/blind-pairs/{token}/answer"), r#"{"answer": "first"}"#);
-    let form = format!("/rate/pair/{token}");
+    let (answer, body) = (format!("/api/v1/blind-pairs/{code}/answer"), r#"{"answer": "first"}"#);
+    let form = format!("/rate/pair/{code}");
     for (method, path) in &addresses {
         assert_eq!(send(&service, &rater, method, path, "", "").await.status, StatusCode::NOT_FOUND, "{path}");
     }
@@ -369,7 +373,7 @@ async fn rater_accesses_assigned_studies_only_until_removed() {
     assert_eq!(sent.status, StatusCode::NOT_FOUND);
     let back = send(&service, &rater, &Method::POST, &format!("{form}/retract"), FORM, "").await;
     assert_eq!(back.status, StatusCode::NOT_FOUND);
-    let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={token}"), "", "").await;
+    let saved = send(&service, &rater, &Method::GET, &format!("/rate?saved={code}"), "", "").await;
     assert_eq!(saved.status, StatusCode::NOT_FOUND);
 
     // After a new assignment, the pair is accessible again.
@@ -478,7 +482,7 @@ async fn study_created_as_restricted_is_never_open() {
     let body = json!({"subject_id": subject, "start": false, "restricted": true});
     let made = post(&service, &clinician, "/api/v1/studies", &body).await;
     let form = format!(
-        "muscles=on&feedback_mode=automatic&trial_budget=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=&restricted=on\
+        "muscles=on&answer_source=gait_rmse&number_of_trials=1&parallel_trials=1&seed=1&tuned_a5=on&reference_gait=&restricted=on\
          &subject={subject}"
     );
     let sent = send(&service, &clinician, &Method::POST, "/studies/new", FORM, &form).await;
@@ -497,7 +501,7 @@ async fn study_created_as_restricted_is_never_open() {
 /// A finished study in which people may answer, and its first three gaits.
 async fn answered_by_people(service: &Service) -> (StudyId, Vec<String>) {
     let mixed = |new: &mut gaitwright_service::studies::study_plan::NewStudy| {
-        (new.feedback_mode, new.trial_budget) = (FeedbackMode::Mixed, 30);
+        (new.answer_source, new.number_of_trials) = (AnswerSource::Both, 30);
     };
     let study = service.study(mixed).await;
     service.wait_for(study, &[StudyState::Finished]).await;

@@ -5,7 +5,7 @@
 use axum::http::StatusCode;
 use gait_learner::{ActionIndex, Feedback};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, read_only, studies};
 use gaitwright_tests::analytic::Analytic;
@@ -24,7 +24,7 @@ async fn learner_feedback(service: &Service, study: StudyId) -> Vec<Feedback> {
 async fn learner_uses_a_suggestion_until_it_is_retracted() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.into_iter().find(|trial| trial.state.as_str() == "converged").unwrap();
     let path = format!("/api/v1/studies/{study}/suggestions");
@@ -71,7 +71,7 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
 async fn suggestion_counts_once_for_each_person_and_not_besides_their_answer() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits = service.trials(study).await;
     gaits.retain(|trial| trial.state.as_str() == "converged");
@@ -125,7 +125,7 @@ async fn queued_jobs_and_workers_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic::slow(Duration::from_millis(50));
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (4, 2)).await;
+    let study = service.study(|new| (new.number_of_trials, new.parallel_trials) = (4, 2)).await;
     let jobs = loop {
         let jobs = service.fetch("/api/v1/jobs").await.items();
         let states: Vec<_> = jobs.as_array().unwrap().iter().map(|job| job["state"].as_str().unwrap()).collect();

@@ -4,12 +4,12 @@
 
 use axum::http::StatusCode;
 use gait_learner::{LearnerSettings, Method, Partner};
-use gaitwright_service::studies::pending_comparison::open_question;
+use gaitwright_service::studies::pending_comparison::pending_comparison;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::workers::{Attempt, InProcess};
 use gaitwright_store::feedback::{FeedbackContent, Source};
-use gaitwright_store::studies::{FeedbackMode, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, StudyState, WarmStartFrom};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, trials};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
@@ -43,7 +43,7 @@ fn essence(trials: &[Trial]) -> Vec<String> {
 async fn undisturbed(seed: u64, trials: u32) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
-    let study = service.study(|new| (new.seed, new.trial_budget) = (seed, trials)).await;
+    let study = service.study(|new| (new.seed, new.number_of_trials) = (seed, trials)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let seen = essence(&service.trials(study).await);
     service.stop().await;
@@ -51,12 +51,12 @@ async fn undisturbed(seed: u64, trials: u32) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn study_ends_with_its_budget_and_gives_the_reason_of_each_trial() {
+async fn study_ends_with_its_number_of_trials_and_gives_the_reason_of_each_trial() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let learner =
         LearnerSettings { partner: Partner::Previous, buffer: 1, repeats: false, ..LearnerSettings::default() };
-    let study = service.study(|new| (new.trial_budget, new.learner) = (15, learner)).await;
+    let study = service.study(|new| (new.number_of_trials, new.learner) = (15, learner)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
 
     let trials = service.trials(study).await;
@@ -125,7 +125,7 @@ async fn study_of_thirty_trials_has_no_gait_twice_unless_results_may_repeat() {
         for repeats in [false, true] {
             let study = service
                 .study(|new| {
-                    (new.trial_budget, new.seed) = (30, 5);
+                    (new.number_of_trials, new.seed) = (30, 5);
                     (new.learner, new.repeat_results) = (LearnerSettings::of(method), Some(repeats));
                 })
                 .await;
@@ -147,7 +147,7 @@ async fn gait_page_lists_the_values_that_leave_the_gait_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let engine = Analytic { states_unchanged_bounds: true, ..Analytic::default() };
     let service = Service::start(&folder.path().join("a.db"), engine, 1).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await[0].id;
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
@@ -164,7 +164,7 @@ async fn study_ends_when_the_gait_of_every_action_is_known() {
     for (repeats, expected) in [(None, 1), (Some(false), 1), (Some(true), 3)] {
         let study = service
             .study(|new| {
-                (new.search_space, new.trial_budget) = (Some(inactive_bound().into()), 30);
+                (new.search_space, new.number_of_trials) = (Some(inactive_bound().into()), 30);
                 new.repeat_results = repeats;
             })
             .await;
@@ -183,7 +183,7 @@ async fn gaits_from_a_root_do_not_depend_on_other_trials() {
     for (seed, parallel_trials) in [(1, 1), (2, 1), (3, 2)] {
         let study = service
             .study(|new| {
-                (new.seed, new.trial_budget, new.parallel_trials) = (seed, 8, parallel_trials);
+                (new.seed, new.number_of_trials, new.parallel_trials) = (seed, 8, parallel_trials);
                 new.warm_start_from = WarmStartFrom::Root;
             })
             .await;
@@ -228,7 +228,7 @@ async fn study_interrupted_during_solves_continues_with_the_same_trials() {
     let database = folder.path().join("a.db");
     let slow = || Analytic::slow(Duration::from_millis(2));
     let mut service = Service::start(&database, slow(), 1).await;
-    let study: StudyId = service.study(|new| (new.seed, new.trial_budget) = (7, 12)).await;
+    let study: StudyId = service.study(|new| (new.seed, new.number_of_trials) = (7, 12)).await;
     for ended in [1, 4, 5, 9] {
         service.wait_for_trials(study, ended).await;
         // Somewhere in the middle of the next solve.
@@ -246,7 +246,7 @@ async fn panicking_solve_is_retried_then_fails_and_never_reaches_the_learner() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic { panics: vec![2], panics_once: vec![1], ..Analytic::default() };
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 4).await;
+    let study = service.study(|new| new.number_of_trials = 4).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     assert!(trials[0].state.is_result(), "one panic is forgiven");
@@ -266,7 +266,7 @@ async fn three_failures_in_a_row_pause_a_study() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic { panics: (1..100).collect(), ..Analytic::default() };
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 10).await;
+    let study = service.study(|new| new.number_of_trials = 10).await;
     let paused = service.wait_for(study, &[StudyState::Paused]).await;
     assert!(paused.state_reason.contains("3 trials in a row failed"), "{}", paused.state_reason);
     assert_eq!(service.trials(study).await.len(), 3);
@@ -279,7 +279,7 @@ async fn workers_and_studies_share_the_pool_without_repeated_jobs() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 3).await;
     let mut studies = Vec::new();
     for seed in 1..4 {
-        studies.push(service.study(|new| (new.seed, new.trial_budget, new.parallel_trials) = (seed, 10, 2)).await);
+        studies.push(service.study(|new| (new.seed, new.number_of_trials, new.parallel_trials) = (seed, 10, 2)).await);
     }
     for study in studies {
         service.wait_for(study, &[StudyState::Finished]).await;
@@ -315,7 +315,7 @@ async fn higher_priorities_run_first_and_equal_ones_share() {
     let mut studies = Vec::new();
     for (seed, priority) in [(1, 0), (2, 0), (3, 5)] {
         let new = |new: &mut NewStudy| {
-            (new.seed, new.priority, new.trial_budget, new.parallel_trials) =
+            (new.seed, new.priority, new.number_of_trials, new.parallel_trials) =
                 (seed, priority, 9, 2 + u32::from(seed < 3));
         };
         studies.push(service.study(new).await);
@@ -341,7 +341,7 @@ async fn pause_cancels_jobs_that_have_not_started() {
     let folder = tempfile::tempdir().unwrap();
     let engine = Away { size: 2, ..Away::default() };
     let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine.clone())).await;
-    let study = service.study(|new| (new.trial_budget, new.parallel_trials) = (4, 2)).await;
+    let study = service.study(|new| (new.number_of_trials, new.parallel_trials) = (4, 2)).await;
     handed_over(&engine, 2).await;
     let path = format!("/api/v1/studies/{study}");
     assert_eq!(service.post(&format!("{path}/pause"), &json!({})).await.status, StatusCode::OK);
@@ -361,7 +361,7 @@ async fn cancelled_solve_stops_within_one_iteration() {
     let solver = Analytic::slow(Duration::from_millis(100));
     let made = Arc::clone(&solver.made);
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     while made.lock().unwrap().len() < 2 {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
@@ -380,7 +380,7 @@ async fn trial_of_vanished_workers_is_lost_and_can_be_retried() {
     let solver = Analytic { hangs: 3, ..Analytic::default() };
     let engine = InProcess::new(1, Arc::new(solver)).with_lease(Duration::from_millis(600));
     let service = Service::start_with(&folder.path().join("a.db"), Arc::new(engine)).await;
-    let study = service.study(|new| new.trial_budget = 1).await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trial = service.trials(study).await.remove(0);
     assert_eq!(trial.state, TrialState::Lost);
@@ -388,7 +388,7 @@ async fn trial_of_vanished_workers_is_lost_and_can_be_retried() {
     assert!(service.feedback(study).await.is_empty(), "what was lost is no result");
 
     let path = format!("/api/v1/studies/{study}/extend");
-    assert_eq!(service.post(&path, &json!({"trial_budget": 2})).await.status, StatusCode::OK);
+    assert_eq!(service.post(&path, &json!({"number_of_trials": 2})).await.status, StatusCode::OK);
     let path = format!("/api/v1/trials/{}/retry", trial.id);
     assert_eq!(service.post(&path, &json!({})).await.status, StatusCode::ACCEPTED);
     service.wait_for(study, &[StudyState::Finished]).await;
@@ -404,7 +404,7 @@ async fn equal_gaits_are_never_offered_for_comparison() {
         .study(|new| {
             new.search_space = Some(inactive_bound().into());
             new.learner = LearnerSettings { partner: Partner::Previous, buffer: 1, ..LearnerSettings::default() };
-            (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human);
+            (new.number_of_trials, new.answer_source) = (3, AnswerSource::People);
         })
         .await;
     service.wait_for(study, &[StudyState::Waiting]).await;
@@ -418,7 +418,7 @@ async fn equal_gaits_are_never_offered_for_comparison() {
     assert_eq!(third.gait_rmse_rad, second.gait_rmse_rad);
     let snapshot =
         StudySnapshot::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
-    let question = service.store.clone().compute(move |pool| open_question(pool, &snapshot)).await.unwrap();
-    assert_eq!(question.unwrap().trials(), Some((third.id, first.id)), "the one before is the same gait");
+    let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &snapshot)).await.unwrap();
+    assert_eq!(pending.unwrap().trials(), Some((third.id, first.id)), "the one before is the same gait");
     service.stop().await;
 }

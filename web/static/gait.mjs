@@ -10,7 +10,7 @@ import { Walker } from "./walker_body.mjs";
 /**
  * @typedef {import("./walker_body.mjs").Place} Place
  * @typedef {import("./walker_body.mjs").Leg} Leg
- * @typedef {import("./walker_body.mjs").Figure} Figure
+ * @typedef {import("./walker_body.mjs").StickFigure} StickFigure
  * @typedef {import("./walker_body.mjs").Frame} Frame
  * @typedef {{stride_time_s: number, stride_length_m: number, frames: (Frame & {time_s: number})[]}} Motion
  */
@@ -62,7 +62,7 @@ const inWords = (domain) => {
 /**
  * The reference gait of a figure, which the server wrote into it: joints in mm, one stride at equal time steps.
  * @param {SVGSVGElement} svg
- * @returns {Figure[]}
+ * @returns {StickFigure[]}
  */
 function referenceOf(svg) {
   const written = svg.querySelector("[data-ghost]")?.getAttribute("data-ghost");
@@ -96,7 +96,7 @@ class Scene {
     return frameAt(this.motion, share * this.motion.stride_time_s);
   }
 
-  /** @param {number} share @returns {Figure} */
+  /** @param {number} share @returns {StickFigure} */
   referenceAt(share) {
     const place = share * (this.reference.length - 1);
     const before = Math.min(Math.floor(place), this.reference.length - 2);
@@ -111,7 +111,7 @@ class Scene {
 
   /**
    * @param {number} strides Whole ones and the share of this one.
-   * @param {Figure | null} ghost The second figure.
+   * @param {StickFigure | null} ghost The second figure.
    */
   draw(strides, ghost) {
     const frame = this.frame(strides % 1);
@@ -207,7 +207,7 @@ class Player {
     requestAnimationFrame((next) => this.tick(next));
   }
 
-  /** @param {number} place @param {number[]} strides @returns {Figure | null} The figure behind a scene. */
+  /** @param {number} place @param {number[]} strides @returns {StickFigure | null} The figure behind a scene. */
   ghost(place, strides) {
     if (!this.overlay.checked) return null;
     const other = this.scenes[1 - place];
@@ -242,7 +242,7 @@ const load = async (trial) => {
  * @param {HTMLElement} box
  */
 export function startWalker(box) {
-  const figures = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-figure"));
+  const figures = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-walker"));
   const controls = addControls(box, figures.length > 1);
   for (const hint of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-drag]"))) hint.hidden = false;
   if (!mayMove()) showStrips(box.querySelector("noscript") ? box : document);

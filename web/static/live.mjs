@@ -13,7 +13,7 @@ const PAUSE = 500;
 /** Time before reconnecting to a service that could not answer, ms. */
 const AGAIN = 3000;
 /** Recorded events that change the page of a study. */
-const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "reported_unsafe", "safety_reviewed", "gait_certified", "gait_simulated", "trial_explained"];
+const RECORDED = ["study_changed", "trial_queued", "trial_started", "trial_ended", "feedback_given", "feedback_retracted", "lab_session_answered", "reported_unsafe", "safety_reviewed", "gait_certified", "execution_reported", "trial_explained"];
 
 /** @type {(node: Node) => string} The summary of a folded part. */
 const titleOf = (node) => (node instanceof HTMLDetailsElement ? (node.querySelector("summary")?.textContent ?? "") : "");

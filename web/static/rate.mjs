@@ -37,18 +37,18 @@ if (box) {
   const load = async (side) => {
     const reply = await fetch(`/api/v1/blind-pairs/${box.dataset.pair}/motions/${side}`);
     if (!reply.ok) throw new Error(`${reply.status}`);
-    return (await reply.json()).figures;
+    return (await reply.json()).stick_figures;
   };
 
-  /** @param {Place[]} joints @returns {import("./walker_body.mjs").Figure} */
-  const figureOf = ([hip, shoulder, ...legs]) => {
+  /** @param {Place[]} joints @returns {import("./walker_body.mjs").StickFigure} */
+  const stickFigureOf = ([hip, shoulder, ...legs]) => {
     const leg = ([knee, ankle, heel, toe] = legs) => ({ knee, ankle, heel, toe });
     return { hip, shoulder, left: leg(legs.slice(0, 4)), right: leg(legs.slice(4)) };
   };
 
   /** @param {SVGSVGElement} svg @param {Element | undefined} picture @param {Place[][]} motion */
   const walker = (svg, picture, motion) => {
-    const parts = picture?.querySelector(".gait-figure")?.children ?? [];
+    const parts = picture?.querySelector(".gait-walker")?.children ?? [];
     if (parts.length === 0) throw new Error("no body");
     svg.append(...[...parts].map((part) => document.importNode(part, true)));
     const [hip, shoulder] = motion[0];
@@ -57,7 +57,7 @@ if (box) {
     const body = new Body(svg);
     return (/** @type {number} */ phase) => {
       const place = Math.min(Math.floor(phase * motion.length), motion.length - 1);
-      body.pose(placements(figureOf(motion[place])));
+      body.pose(placements(stickFigureOf(motion[place])));
     };
   };
 

@@ -5,8 +5,8 @@
 /**
  * @typedef {[number, number]} Place Forward and up, m.
  * @typedef {{knee: Place, ankle: Place, heel: Place, toe: Place}} Leg
- * @typedef {{hip: Place, shoulder: Place, left: Leg, right: Leg}} Figure
- * @typedef {Figure & {domain: string, forces_n: Place[], activations?: number[]}} Frame
+ * @typedef {{hip: Place, shoulder: Place, left: Leg, right: Leg}} StickFigure
+ * @typedef {StickFigure & {domain: string, forces_n: Place[], activations?: number[]}} Frame
  * @typedef {{x: number, y: number, degrees: number}} Placement
  */
 
@@ -16,7 +16,7 @@ export const UNITS = 100;
 const LEAST_FORCE_N = 10;
 const ARROW_HEAD = 5;
 
-/** @type {(figure: Figure) => Record<string, [Place, Place, Place, number]>} Origin, direction, and its angle at rest. */
+/** @type {(figure: StickFigure) => Record<string, [Place, Place, Place, number]>} Origin, direction, and its angle at rest. */
 const frames = ({ hip, shoulder, left, right }) => ({
   trunk: [hip, hip, shoulder, -90],
   "left.thigh": [hip, hip, left.knee, 90],
@@ -29,7 +29,7 @@ const frames = ({ hip, shoulder, left, right }) => ({
 
 /**
  * Where the segments are in a drawing whose origin is on the ground below the hip.
- * @param {Figure} figure
+ * @param {StickFigure} figure
  * @returns {Record<string, Placement>}
  */
 export function placements(figure) {
@@ -124,7 +124,7 @@ export class Walker {
     path?.setAttribute("d", line);
   }
 
-  /** @param {Figure | null} figure The pose of the second figure; without one it is hidden. */
+  /** @param {StickFigure | null} figure The pose of the second figure; without one it is hidden. */
   poseGhost(figure) {
     this.ghost?.setAttribute("visibility", figure ? "visible" : "hidden");
     if (figure) this.ghostBody?.pose(placements(figure));

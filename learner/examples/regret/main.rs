@@ -1,9 +1,9 @@
 //! Simple regret of a method on seeded benchmark problems.
 //!
 //! ```text
-//! cargo run --release -p gait-learner --example regret -- --problem table1|hart3|hart6 --seeds A..B --method NAME
+//! cargo run --release -p gait-learner --example regret -- --problem table1|hart3|hart6|atlas1|atlas1m --seeds A..B --method NAME
 //!     --comparisons N [--noise S] [--lengthscale L] [--batch N] [--set '{"setting": value}'] --out FILE.csv
-//! cargo run --release -p gait-learner --example regret -- --problem ATLAS.csv --columns NAME,... --seeds A..B --method NAME ...
+//! cargo run --release -p gait-learner --example regret -- --problem ATLAS.csv [--columns NAME,...] --seeds A..B ...
 //! cargo run --release -p gait-learner --example regret -- --summarise FILE.csv...
 //! ```
 //!
@@ -11,8 +11,8 @@
 //! `information_gain`) with recommended settings, a method with the suffix `_published`, or `eubo_uncertain` (EUBO for
 //! noisy feedback).
 //!
-//! `--problem ATLAS.csv` reads a table of `gaitwright atlas`. Each seed is a person whose utility is a random mixture of the
-//! columns, of which low values are better.
+//! `atlas1` and `atlas1m` are the gaits of subject 1 without and with muscles, and `--problem ATLAS.csv` reads another table of
+//! `gaitwright atlas`. Each seed is a person whose utility is a random mixture of the columns, of which low values are better.
 //!
 //! Writes rows `method,seed,k,regret`: regret after `k` comparisons, that is `k + 1` visited actions. Prints quartiles.
 //! Regret is 1 minus the utility of the recommended action. `--noise S` adds logistic noise of scale `S` to the
@@ -36,7 +36,7 @@ use gait_learner::LearnerSettings;
 use problems::Problem;
 use simulation::{Person, champion, run};
 use summary::{Curves, quantile, report};
-use table::Table;
+use table::{DEFAULT_COLUMNS, Table};
 
 struct Options {
     problem: String,
@@ -67,7 +67,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
         comparisons: 50,
         noise: 0.0,
         lengthscale: None,
-        columns: "gait_rmse_rad".into(),
+        columns: DEFAULT_COLUMNS.into(),
         batch: 1,
         set: serde_json::Map::new(),
         out: None,
@@ -139,7 +139,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let path = std::path::Path::new(&options.problem);
     let is_table = path.extension().is_some_and(|extension| extension == "csv");
-    let table = is_table.then(|| Table::read(path, &options.columns)).transpose()?;
+    let table = match Table::built_in(&options.problem, &options.columns) {
+        None if is_table => Some(Table::read(path, &options.columns)),
+        built_in => built_in,
+    };
+    let table = table.transpose()?;
     let start = Instant::now();
     let mut curves = Vec::new();
     for seed in options.seeds.clone() {

@@ -53,11 +53,11 @@ pub fn run(
             proposed.push(learner.propose(&problem.space, &log, &proposed, settings, seed)?.action);
         }
         for action in proposed {
-            let questions = learner.comparisons_to_ask(&problem.space, &log, action, settings)?;
+            let comparisons = learner.proposed_comparisons(&problem.space, &log, action, settings)?;
             if labelled {
                 log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
             }
-            log.feedback.extend(questions.iter().filter_map(|question| person.compare(action, question.against)));
+            log.feedback.extend(comparisons.iter().filter_map(|comparison| person.compare(action, comparison.against)));
             log.visited.push(action);
             let best = learner.posterior(&problem.space, &log, settings)?.best();
             // An action has been visited, so there is a best one.

@@ -1,10 +1,19 @@
 //! A benchmark problem from a table of results, such as that of `gaitwright atlas`: a row for each action of a grid, whose
 //! first columns are the values of the action. Each seed is a person, who prefers low values of some columns: the utility
 //! is a mixture of the columns with random weights.
+//!
+//! Two such tables are part of the project; `atlases/README.md` says how they are made.
 
 use crate::problems::{Problem, SplitMix64};
 use gait_learner::{Dimension, SearchSpace};
 use std::path::Path;
+
+/// Name and content of each built-in table: the atlas of subject 1, without and with muscles.
+const BUILT_IN: [(&str, &[u8]); 2] =
+    [("atlas1", include_bytes!("atlases/atlas1.csv.zst")), ("atlas1m", include_bytes!("atlases/atlas1m.csv.zst"))];
+
+/// Columns of a built-in table that people care about, if none are named.
+pub const DEFAULT_COLUMNS: &str = "gait_rmse_other_rad,peak_hip_torque_nm_kg,step_time_asymmetry,cost_of_transport";
 
 /// Number of leading columns that are the values of an action.
 const DIMENSIONS: usize = 8;
@@ -17,9 +26,21 @@ pub struct Table {
 }
 
 impl Table {
+    /// The built-in table of this name; `None` if there is none.
+    pub fn built_in(name: &str, columns: &str) -> Option<Result<Self, String>> {
+        let (_, packed) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+        let unpacked = zstd::decode_all(*packed).map_err(|error| error.to_string());
+        let text = unpacked.and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
+        Some(text.and_then(|text| Self::parse(&text, columns)))
+    }
+
     /// Reads the file. `columns` are the names of the columns of which low values are better, separated by commas.
     pub fn read(path: &Path, columns: &str) -> Result<Self, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        Self::parse(&text, columns)
+    }
+
+    fn parse(text: &str, columns: &str) -> Result<Self, String> {
         let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
         let header = lines.next().ok_or("the table is empty")?;
         let place = |name: &str| header.iter().position(|h| *h == name).ok_or(format!("there is no column {name}"));

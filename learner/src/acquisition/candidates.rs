@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use crate::acquisition::line;
+use crate::acquisition::line_points;
 use crate::action::ActionIndex;
 use crate::excluded::ForbiddenActions;
 use crate::posterior::Posterior;
@@ -21,7 +21,7 @@ pub(crate) fn near_best_or_random(
 ) -> Vec<ActionIndex> {
     let space = posterior.space();
     let mut seen = HashSet::new();
-    let mut chosen: Vec<ActionIndex> = (0..LINES).flat_map(|_| line::through(space, best, random)).collect();
+    let mut chosen: Vec<ActionIndex> = (0..LINES).flat_map(|_| line_points::through(space, best, random)).collect();
     chosen.extend((0..count).map_while(|_| forbidden.random_other(random)));
     chosen.retain(|action| !forbidden.contains(*action) && seen.insert(*action));
     chosen.truncate(count);

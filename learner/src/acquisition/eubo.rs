@@ -9,7 +9,7 @@ use crate::acquisition::avoidance::Avoidance;
 use crate::acquisition::candidates::near_best_or_random;
 use crate::acquisition::duel::{Chance, Duel};
 use crate::acquisition::eubo_bounds::{GainBound, expected_gain};
-use crate::acquisition::line;
+use crate::acquisition::line_points;
 use crate::action::ActionIndex;
 use crate::action_moments::ActionSet;
 use crate::excluded::ForbiddenActions;
@@ -140,7 +140,7 @@ pub(crate) fn proposal(
     let lines = posterior.settings().lines;
     if lines > 0 && posterior.settings().line_trials.is_none_or(|most| posterior.visited().len() < most) {
         let candidates: Vec<ActionIndex> =
-            (0..lines).flat_map(|_| line::through(posterior.space(), best, random)).collect();
+            (0..lines).flat_map(|_| line_points::through(posterior.space(), best, random)).collect();
         if let Some(action) = against(posterior, best, forbidden, pending, Some(&candidates)) {
             return Some(action);
         }

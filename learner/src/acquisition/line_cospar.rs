@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use crate::acquisition::avoidance::Avoidance;
 use crate::acquisition::candidates::highest;
-use crate::acquisition::line;
+use crate::acquisition::line_points;
 use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::excluded::{ExcludedActions, ForbiddenActions};
@@ -30,7 +30,7 @@ pub(crate) fn unvisited_on_line(
     let avoidance = Avoidance::of(posterior);
     for attempt in 0..MAX_LINES {
         let mut candidates = suggested.clone();
-        for action in line::through(posterior.space(), best, random) {
+        for action in line_points::through(posterior.space(), best, random) {
             if !forbidden.contains(action) && !candidates.contains(&action) {
                 candidates.push(action);
             }
@@ -59,7 +59,7 @@ pub(crate) fn visited_or_on_line(
     let observed = posterior.utility.observed();
     let avoidance = Avoidance::of(posterior);
     let allowed = |action: ActionIndex| avoidance.as_ref().is_none_or(|avoidance| avoidance.allows(action));
-    let line: Vec<ActionIndex> = line::through(space, best, random)
+    let line: Vec<ActionIndex> = line_points::through(space, best, random)
         .into_iter()
         .filter(|&action| observed.slot(action).is_none() && allowed(action))
         .collect();

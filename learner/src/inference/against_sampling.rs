@@ -55,7 +55,7 @@ fn sampled(observed: &ObservedPoints, draws: usize) -> (Vec<f64>, Vec<f64>) {
     (first, sd)
 }
 
-fn observations(noise: f64, ties: bool, seed: u64, space: &SearchSpace) -> Vec<Observation> {
+fn observations(noise: f64, no_difference: bool, seed: u64, space: &SearchSpace) -> Vec<Observation> {
     let mut random = Random::new(seed, 1);
     let mut observations = Vec::new();
     let mut last: Option<ActionIndex> = None;
@@ -66,7 +66,7 @@ fn observations(noise: f64, ties: bool, seed: u64, space: &SearchSpace) -> Vec<O
         observations.push(Observation { plus: action, minus: None, interval: Interval { low, high, noise: 0.1 } });
         if let Some(last) = last.filter(|&last| last != action) {
             let (winner, loser) = if utility(action) >= utility(last) { (action, last) } else { (last, action) };
-            let high = if ties && random.uniform() < 0.3 { 0.1 } else { f64::INFINITY };
+            let high = if no_difference && random.uniform() < 0.3 { 0.1 } else { f64::INFINITY };
             let low = if high.is_finite() { -0.1 } else { 0.0 };
             observations.push(Observation {
                 plus: winner,
@@ -87,12 +87,12 @@ fn approximations_agree_with_long_sampling() {
     let kernel = crate::learner::kernel(&space, &LearnerSettings::default());
     println!("data                        error of mean (EP, Laplace)   sd (sampled, EP, Laplace)");
     // Laplace's approximation gets wider bounds, because its error is larger (docs/benchmarks/learner.md).
-    for (name, noise, ties, bounds) in [
+    for (name, noise, no_difference, bounds) in [
         ("preferences, noise 0.02", 0.02, false, [0.04, 0.5]),
         ("preferences, noise 0.3", 0.3, false, [0.04, 0.4]),
-        ("with ties, noise 0.1", 0.1, true, [0.04, 0.45]),
+        ("no difference, noise 0.1", 0.1, true, [0.04, 0.45]),
     ] {
-        let observations = observations(noise, ties, 5, &space);
+        let observations = observations(noise, no_difference, 5, &space);
         let run = |method: &dyn Approximate| {
             let model = ProcessModel { space: &space, kernel: &kernel, link: Link::Probit, method };
             Fit::of(&model, &observations).unwrap()

@@ -115,10 +115,10 @@ mod tests {
                 }
             }
         }
-        let belief = posterior(&space, &log, &settings).unwrap();
+        let posterior = posterior(&space, &log, &settings).unwrap();
         for (k, action) in [a, b].into_iter().enumerate() {
             let (mean, sd) = (first[k] / mass, (second[k] / mass - (first[k] / mass).powi(2)).sqrt());
-            let got = belief.predict(action).unwrap();
+            let got = posterior.predict(action).unwrap();
             assert!((got.mean - mean).abs() < 0.02, "{action}: {got:?} against {mean} {sd}");
             assert!((got.standard_deviation - sd).abs() < 0.02, "{action}: {got:?} against {mean} {sd}");
         }
@@ -131,9 +131,9 @@ mod tests {
         let (winner, loser) = (ActionIndex(0), ActionIndex(1));
         let log =
             FeedbackLog { visited: vec![winner, loser], feedback: vec![Feedback::Preference { winner, loser }; 3] };
-        let belief = posterior(&space, &log, &LearnerSettings::published(Method::Eubo)).unwrap();
+        let posterior = posterior(&space, &log, &LearnerSettings::published(Method::Eubo)).unwrap();
         let stopped = ExpectationPropagation { sweeps: 2, ..ExpectationPropagation::default() };
-        let fitted = stopped.approximate(belief.utility.observed(), Link::Probit);
+        let fitted = stopped.approximate(posterior.utility.observed(), Link::Probit);
         assert!(fitted.is_err_and(|error| error.to_string().contains("did not converge in 2 sweeps")));
     }
 }

@@ -19,11 +19,12 @@ pub struct Agreement {
     pub labels: usize,
     /// Labels whose category contains the posterior mean. With separate labels, feasibility and grade must both agree.
     pub labels_agreeing: usize,
-    /// Number of ties.
-    pub ties: usize,
-    /// Ties whose posterior means differ by at most the tie width. With separate labels, not those of a feasible with
+    /// Number of answers of no difference.
+    pub no_difference: usize,
+    /// Answers of no difference whose posterior means differ by at most `no_difference_width`. With separate labels, not
+    /// those of a feasible with
     /// an infeasible action.
-    pub ties_agreeing: usize,
+    pub no_difference_agreeing: usize,
 }
 
 impl Posterior {
@@ -35,7 +36,7 @@ impl Posterior {
                 Feedback::Preference { .. } | Feedback::Suggestion { .. } => {
                     (&mut agreement.comparisons, &mut agreement.comparisons_agreeing)
                 }
-                Feedback::Tie { .. } => (&mut agreement.ties, &mut agreement.ties_agreeing),
+                Feedback::NoDifference { .. } => (&mut agreement.no_difference, &mut agreement.no_difference_agreeing),
                 Feedback::Label { .. } => (&mut agreement.labels, &mut agreement.labels_agreeing),
             };
             *all += 1;
@@ -55,8 +56,8 @@ impl Posterior {
                     None => mean(winner) > mean(loser),
                 }
             }
-            Feedback::Tie { a, b } => {
-                let alike = (mean(a) - mean(b)).abs() <= settings.tie_width;
+            Feedback::NoDifference { a, b } => {
+                let alike = (mean(a) - mean(b)).abs() <= settings.no_difference_width;
                 alike && self.decided_by_labels(a, b).is_none()
             }
             Feedback::Label { action, category } => {

@@ -24,7 +24,7 @@ fn log() -> FeedbackLog {
         feedback: vec![
             Feedback::Label { action: a, category: 1 },
             Feedback::Preference { winner: a, loser: b },
-            Feedback::Tie { a: b, b: ActionIndex(9) },
+            Feedback::NoDifference { a: b, b: ActionIndex(9) },
             Feedback::Label { action: c, category: 0 },
             Feedback::Suggestion { suggested: ActionIndex(2), over: b },
         ],
@@ -133,7 +133,7 @@ fn probabilities_means_and_agreement_are_consistent() {
             assert!(!estimate.best_of_grid(50, 1).unwrap().is_empty());
             let agreement = estimate.agreement();
             assert_eq!((agreement.comparisons, agreement.comparisons_agreeing), (2, 2));
-            assert_eq!((agreement.labels, agreement.labels_agreeing, agreement.ties), (2, 2, 1));
+            assert_eq!((agreement.labels, agreement.labels_agreeing, agreement.no_difference), (2, 2, 1));
             let slice = estimate.slice(2, 0, a).unwrap();
             assert_eq!((slice.predictions.len(), slice.predictions[0].len()), (4, 2));
             assert_eq!(slice.predictions[0][0], estimate.predict(a).unwrap());
@@ -164,10 +164,10 @@ fn separate_labels_decide_comparisons_with_infeasible_actions() {
     let estimate = posterior(&space, &log, &settings).unwrap();
     assert!(estimate.preference_probability(converges, fails).unwrap() > 0.7);
     assert_eq!((estimate.agreement().comparisons, estimate.agreement().comparisons_agreeing), (1, 1));
-    // A preference and a tie that contradict the labels, and a second infeasible action.
+    // A preference and an answer of no difference that contradict the labels, and a second infeasible action.
     log.feedback.extend([
         Feedback::Preference { winner: fails, loser: converges },
-        Feedback::Tie { a: fails, b: converges },
+        Feedback::NoDifference { a: fails, b: converges },
         Feedback::Label { action: far, category: 0 },
     ]);
     for _ in 0..5 {
@@ -177,7 +177,7 @@ fn separate_labels_decide_comparisons_with_infeasible_actions() {
     }
     let estimate = posterior(&space, &log, &settings).unwrap();
     let agreement = estimate.agreement();
-    assert_eq!((agreement.comparisons, agreement.comparisons_agreeing, agreement.ties_agreeing), (2, 1, 0));
+    assert_eq!((agreement.comparisons, agreement.comparisons_agreeing, agreement.no_difference_agreeing), (2, 1, 0));
     let p = estimate.preference_probability(fails, far).unwrap();
     assert!((p - 0.5).abs() < 0.1, "{p}");
     // Without labels, or if both actions converge, the utility decides.

@@ -43,8 +43,8 @@ settings! {
     ordinal_noise: f64,
     ordinal_thresholds: Vec<f64>,
     coactive_noise: f64,
-    tie_noise: f64,
-    tie_width: f64,
+    no_difference_noise: f64,
+    no_difference_width: f64,
     avoidance: Option<f64>,
     samples_per_iteration: usize,
     repeats: bool,
@@ -116,7 +116,7 @@ mod tests {
         let stored = r#"{"method":"eubo","inference":"laplace","link":"logistic","signal_variance":1.0,"nugget":1e-5,
             "lengthscale_factor":1.0,"labels":"in_utility",
             "start":"random","preference_noise":0.02,"ordinal_noise":0.1,"ordinal_thresholds":[0.0],
-            "coactive_noise":0.02,"tie_noise":0.02,"tie_width":0.02,"avoidance":null,
+            "coactive_noise":0.02,"no_difference_noise":0.02,"no_difference_width":0.02,"avoidance":null,
             "samples_per_iteration":1,"repeats":false,"lines":0,"line_trials":null,
             "partner":"incumbent","buffer":1}"#;
         assert_eq!(read(stored), LearnerSettings { method: Method::Eubo, ..LearnerSettings::of(Method::LineCoSpar) });

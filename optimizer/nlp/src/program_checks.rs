@@ -43,7 +43,7 @@ pub(crate) fn check_bounds(name: &str, lower: &[f64], upper: &[f64]) -> Result<(
     for (i, (l, u)) in lower.iter().zip(upper).enumerate() {
         if l.is_nan() || u.is_nan() || l > u || *l == f64::INFINITY || *u == f64::NEG_INFINITY {
             return Err(NlpError::InvalidProblem(format!(
-                "the bounds of {name} {i}, {l} and {u}, contain no finite value"
+                "the bounds of {name} {i}, {l} and {u}, admit no finite value"
             )));
         }
     }
@@ -62,7 +62,7 @@ mod tests {
         let reason = "Jacobian pattern: column 0 has a row index of 2; it must be less than 2";
         assert_eq!(error, NlpError::InvalidProblem(reason.to_owned()));
         let error = check_bounds("variable", &[0.0, 1.0], &[0.0, -1.0]).unwrap_err();
-        let reason = "the bounds of variable 1, 1 and -1, contain no finite value";
+        let reason = "the bounds of variable 1, 1 and -1, admit no finite value";
         assert_eq!(error, NlpError::InvalidProblem(reason.to_owned()));
     }
 }

@@ -68,7 +68,7 @@ impl CertifiedGait {
     pub fn walker_in_words(&self) -> String {
         let Subject { height_m, body_mass_kg } = self.subject;
         let muscles = if self.muscles { "with muscles" } else { "without muscles" };
-        format!("subject of {height_m} m and {body_mass_kg} kg, device {:?}, {muscles}", self.device)
+        format!("subject: {height_m} m, {body_mass_kg} kg; device: {}; {muscles}", self.device)
     }
 }
 

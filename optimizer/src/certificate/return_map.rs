@@ -24,14 +24,14 @@ const SCHUR_ITERATIONS: usize = 10_000;
 
 /// A multiplier: an eigenvalue of the derivative of the Poincare map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Multiplier {
+pub struct FloquetMultiplier {
     /// Real part.
     pub real: f64,
     /// Imaginary part.
     pub imaginary: f64,
 }
 
-impl Multiplier {
+impl FloquetMultiplier {
     /// Absolute value.
     pub fn modulus(&self) -> f64 {
         self.real.hypot(self.imaginary)
@@ -48,7 +48,7 @@ pub struct ReturnMap {
     /// Largest distance between the first state of the gait and the fixed point, rad and rad/s.
     pub fixed_point_distance: f64,
     /// Multipliers by variational equations and saltation, largest modulus first.
-    pub multipliers: Vec<Multiplier>,
+    pub multipliers: Vec<FloquetMultiplier>,
     /// Largest modulus of these multipliers.
     pub largest: f64,
     /// Largest modulus of the multipliers, from finite differences of simulated domains.
@@ -113,10 +113,10 @@ fn fixed_point(walker: &HybridWalker<'_>, start: &State) -> Result<State, Fall> 
 }
 
 /// Eigenvalues, largest modulus first; `None` if the iteration does not converge.
-fn multipliers(matrix: DMatrix<f64>) -> Option<Vec<Multiplier>> {
+fn multipliers(matrix: DMatrix<f64>) -> Option<Vec<FloquetMultiplier>> {
     let schur = Schur::try_new(matrix, f64::EPSILON, SCHUR_ITERATIONS)?;
-    let mut values: Vec<Multiplier> =
-        schur.complex_eigenvalues().iter().map(|v| Multiplier { real: v.re, imaginary: v.im }).collect();
+    let mut values: Vec<FloquetMultiplier> =
+        schur.complex_eigenvalues().iter().map(|v| FloquetMultiplier { real: v.re, imaginary: v.im }).collect();
     values.sort_by(|a, b| b.modulus().total_cmp(&a.modulus()));
     Some(values)
 }
@@ -135,7 +135,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
     let on_possible = possible.transpose() * derivative * &possible;
     let multipliers_found = multipliers(on_possible).ok_or_else(no_eigenvalues)?;
     let ByDifferences { finest, coarser } = by_differences(walker, &fixed)?;
-    let largest = |matrix| multipliers(matrix).map(|found| found.first().map_or(0.0, Multiplier::modulus));
+    let largest = |matrix| multipliers(matrix).map(|found| found.first().map_or(0.0, FloquetMultiplier::modulus));
     let by_differences = largest(finest).ok_or_else(no_eigenvalues)?;
     let less_fine = largest(coarser).ok_or_else(no_eigenvalues)?;
     // A proportional change of velocities preserves contacts and virtual constraints.
@@ -149,7 +149,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
             gait_residual: residual(start)?,
             fixed_point_residual: residual(&fixed)?,
             fixed_point_distance: (section(&fixed) - section(start)).amax(),
-            largest: multipliers_found.first().map_or(0.0, Multiplier::modulus),
+            largest: multipliers_found.first().map_or(0.0, FloquetMultiplier::modulus),
             largest_by_differences: by_differences,
             differences_resolve: (by_differences - less_fine).abs(),
             multipliers: multipliers_found,

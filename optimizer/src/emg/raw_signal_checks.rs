@@ -70,7 +70,7 @@ impl EmgRecording {
         (share < LEAST_IN_BAND).then(|| {
             format!(
                 "{:.1} % of the signal (RMS) is within {band_low_hz} to {band_high_hz} Hz, less than {:.0} %. It looks \
-                 like an envelope or movement, but the raw signal is needed",
+                 like an envelope or a movement artefact; upload the raw signal",
                 100.0 * share,
                 100.0 * LEAST_IN_BAND
             )

@@ -1,7 +1,7 @@
 //! Disturbances of a simulated walk.
 
 use super::ground::YIELD_M;
-use super::random::Random;
+use super::random_stream::RandomStream;
 use super::terrain::Terrain;
 use crate::subject::Subject;
 
@@ -52,7 +52,7 @@ impl MassChanges {
     }
 
     /// A factor, uniform on either side of 1.
-    fn draw(self, random: &mut Random) -> f64 {
+    fn draw(self, random: &mut RandomStream) -> f64 {
         let change = random.within(1.0);
         1.0 + change * if change < 0.0 { self.decrease } else { self.increase }
     }
@@ -69,7 +69,7 @@ pub(super) struct Disturbance {
     /// How far the ground yields under body weight, m.
     pub(super) yield_m: f64,
     /// Noise of the sensors: the constant error of the thigh angle in rad, and a stream.
-    pub(super) noise: Option<(f64, Random)>,
+    pub(super) noise: Option<(f64, RandomStream)>,
 }
 
 impl Disturbance {
@@ -100,7 +100,7 @@ impl Disturbance {
         step_m: f64,
         pushed_within_s: f64,
     ) -> Self {
-        let mut random = Random::new(seed, u64::from(walk));
+        let mut random = RandomStream::new(seed, u64::from(walk));
         let mass_factor = mass_changes.draw(&mut random);
         let speed_factor = 1.0 + random.within(SPEED_CHANGE);
         let push = Push { start_s: pushed_within_s * random.uniform(), impulse_n_s: random.within(PUSH_N_S) };

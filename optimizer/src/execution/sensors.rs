@@ -6,7 +6,7 @@
 
 use super::control_period::CONTROL_PERIOD_S;
 use super::plant::PlantMotion;
-use super::random::Random;
+use super::random_stream::RandomStream;
 use crate::body::Side;
 use std::collections::VecDeque;
 
@@ -55,7 +55,7 @@ impl SensorReadings {
 pub(super) struct Sensors {
     delayed: VecDeque<SensorReadings>,
     /// Constant error of the thigh angle, rad, and the source of noise; `None` for exact sensors.
-    noise: Option<(f64, Random)>,
+    noise: Option<(f64, RandomStream)>,
 }
 
 fn rounded(value: f64, step: f64) -> f64 {
@@ -64,7 +64,7 @@ fn rounded(value: f64, step: f64) -> f64 {
 
 impl Sensors {
     /// Sensors with a delay of whole periods of the controller, which see the motion `start` until then.
-    pub(super) fn new(delay_periods: usize, noise: Option<(f64, Random)>, start: &PlantMotion) -> Self {
+    pub(super) fn new(delay_periods: usize, noise: Option<(f64, RandomStream)>, start: &PlantMotion) -> Self {
         Self { delayed: vec![SensorReadings::exactly(start); delay_periods].into(), noise }
     }
 

@@ -3,7 +3,7 @@
 use super::disturbance::{Disturbance, MassChanges, Push};
 use super::ground::YIELD_M;
 use super::plant::{AppliedTorques, Plant, PlantMotion};
-use super::random::Random;
+use super::random_stream::RandomStream;
 use super::simulated_walk::{PLANT_STEPS, SimulatedWalker, WalkEnd};
 use super::terrain::Terrain;
 use super::{ExecutionOptions, simulate};
@@ -74,7 +74,7 @@ fn ground_carries_the_weight_of_a_standing_walker() {
 
 #[test]
 fn forces_of_the_ground_stay_in_the_friction_cone_when_a_walker_drops_and_slides() {
-    let (model, terrain) = (walker_model(), Terrain::random(0.7, 0.01, &mut Random::new(1, 1)));
+    let (model, terrain) = (walker_model(), Terrain::random(0.7, 0.01, &mut RandomStream::new(1, 1)));
     let plant = Plant::new(&model, &terrain, YIELD_M, ANKLE_RANGE_RAD);
     let mut motion = PlantMotion::new(POSTURE, [2.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     motion.q[1] = 0.95;

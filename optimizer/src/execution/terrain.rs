@@ -1,6 +1,6 @@
 //! The height of the ground along the path: a plateau for each step, joined by ramps.
 
-use super::random::Random;
+use super::random_stream::RandomStream;
 
 /// Length of a ramp between plateaus, m (assumption). It lies under the swing foot, between two footholds.
 const RAMP_M: f64 = 0.1;
@@ -21,7 +21,7 @@ impl Terrain {
 
     /// Plateaus at the mean step length with heights uniform in `-largest_m..largest_m`. The first one is level: a
     /// simulated walk starts on it, and so is the one behind the start, because the trailing foot stands there.
-    pub(super) fn random(spacing_m: f64, largest_m: f64, random: &mut Random) -> Self {
+    pub(super) fn random(spacing_m: f64, largest_m: f64, random: &mut RandomStream) -> Self {
         let heights = (0..PLATEAUS).map(|k| if k == 0 { 0.0 } else { random.within(largest_m) }).collect();
         Self { spacing_m, heights_m: heights }
     }
@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn heights_are_continuous_and_within_their_range() {
-        let terrain = Terrain::random(0.7, 0.01, &mut Random::new(3, 1));
+        let terrain = Terrain::random(0.7, 0.01, &mut RandomStream::new(3, 1));
         let step = 1e-4;
         let mut rises = 0;
         for k in -10_000..600_000 {

@@ -4,7 +4,8 @@
 //! becomes a margin of the bound at both nodes, and the problem is solved again (an exchange method of semi-infinite
 //! programming, Hettich and Kortanek 1993, section 7).
 
-use super::contact_limits::{FRICTION_SCALE, HEIGHT_SCALE, clearance_weight, height_row};
+use super::contact_limits::FRICTION_SCALE;
+use super::foot_clearance::{HEIGHT_SCALE, clearance_weight, height_row};
 use super::layout::{DomainLayout, FORCE, Q, QD, QDD, U};
 use super::margins::Margins;
 use super::program_data::GaitProgram;

@@ -6,7 +6,7 @@
 //! device or of the settings is stricter than the bound, do not matter. Each constraint depends on one tuned bound only,
 //! so the conditions of several bounds are independent.
 
-use super::contact_limits::clearance_weight;
+use super::foot_clearance::clearance_weight;
 use super::inter_node_check::{BetweenNodes, inter_node_excess};
 use super::margins::Margins;
 use super::problem_definition::GaitProblem;

@@ -28,7 +28,7 @@ pub struct BoundSensitivity {
     /// Derivatives of the results of the gait.
     pub derivatives: ResultDerivatives,
     /// Values of the bound between which the active constraints stay the same, to first order; `None` if they do for every
-    /// value in that direction.
+    /// value in that direction. Exact for a bound that is not active: there the gait stays as it is.
     pub interval: (Option<f64>, Option<f64>),
     /// Whether a constraint is about to become active or inactive, in which case the derivatives on the two sides
     /// differ.

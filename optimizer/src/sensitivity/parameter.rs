@@ -3,11 +3,11 @@
 use super::active::{self, ActiveSet};
 use super::bound_sensitivity::{BoundSensitivity, GaitSensitivityError};
 use super::result_derivatives::ResultDerivatives;
-use crate::gait_problem::{GaitProblem, GaitProgram, gait_of};
+use crate::gait_problem::{ConvergedGait, GaitProblem, GaitProgram, UnchangedBound, gait_of};
 use crate::model_error::ModelError;
-use crate::solve::{GaitResults, SolveError, WarmStart, check_shape};
+use crate::solve::{GaitResults, SolveError, SolveOptions, WarmStart, check_shape, final_settings};
 use crate::tuned_bounds::TunedBounds;
-use interior_point::{NlpSettings, NonlinearProgram, ParameterDerivative, Sensitivity};
+use interior_point::{NonlinearProgram, ParameterDerivative, Sensitivity};
 
 /// Step of the differences, as a share of the allowed range of a bound. Bounds and rows are piecewise linear in the tuned
 /// bounds, so that differences are exact up to rounding.
@@ -18,13 +18,15 @@ pub(super) struct PointSensitivities {
     pub(super) program: GaitProgram,
     parameters: Vec<ParameterDerivative>,
     sensitivities: Vec<Sensitivity>,
+    /// Empty if the gait exceeds bounds between its nodes.
+    unchanged_bounds: Vec<UnchangedBound>,
 }
 
 impl PointSensitivities {
     pub(super) fn new(
         problem: &GaitProblem,
         solution: &WarmStart,
-        settings: &NlpSettings,
+        options: &SolveOptions,
     ) -> Result<Self, GaitSensitivityError> {
         let program = problem.program(problem.muscles).map_err(SolveError::from)?;
         if solution.muscles != problem.muscles || solution.mesh != problem.settings.mesh {
@@ -33,12 +35,23 @@ impl PointSensitivities {
             );
         }
         check_shape(&program, solution)?;
+        let converged = ConvergedGait {
+            problem,
+            program: &program,
+            margins: &solution.margins,
+            gait: &gait_of(problem, &program, &solution.point.x),
+            point: &solution.point,
+            tolerance: options.tolerance,
+            checks_between_nodes: options.tightening_rounds > 0,
+        };
+        let unchanged_bounds = converged.unchanged_bounds();
         let program = program.tightened(&solution.margins);
         let parameters: Result<Vec<_>, ModelError> =
             (0..TunedBounds::COUNT).map(|bound| parameter(problem, &program, solution, bound)).collect();
         let parameters = parameters.map_err(SolveError::from)?;
-        let sensitivities = interior_point::sensitivities(&program, &solution.point, settings, &parameters)?;
-        Ok(Self { program, parameters, sensitivities })
+        let sensitivities =
+            interior_point::sensitivities(&program, &solution.point, &final_settings(options), &parameters)?;
+        Ok(Self { program, parameters, sensitivities, unchanged_bounds })
     }
 
     /// Mechanical cost of transport of the solution.
@@ -51,13 +64,22 @@ impl PointSensitivities {
         let (parameter, sensitivity) = (&self.parameters[bound], &self.sensitivities[bound]);
         let value = problem.bounds.to_array()[bound];
         let set = ActiveSet::new(&self.program, &solution.point);
-        let (back, forth) = set.steps(parameter, &sensitivity.point);
+        let active = active::of_parameter(&self.program, &set, parameter);
+        // Which of two limits is the stricter one can change beyond the point, which no derivative shows. For a bound that is
+        // not active, the interval is known exactly.
+        let interval = match self.unchanged_bounds.get(bound) {
+            Some(unchanged) if active.is_empty() => (unchanged.least, unchanged.most),
+            _ => {
+                let (back, forth) = set.steps(parameter, &sensitivity.point);
+                (back.map(|step| value + step), forth.map(|step| value + step))
+            }
+        };
         BoundSensitivity {
             bound: TunedBounds::NAMES[bound],
             value,
-            active: active::of_parameter(&self.program, &set, parameter),
+            active,
             derivatives: ResultDerivatives::along(problem, &self.program, &solution.point.x, sensitivity),
-            interval: (back.map(|step| value + step), forth.map(|step| value + step)),
+            interval,
             is_weakly_active: set.is_weak(parameter),
         }
     }

@@ -6,7 +6,7 @@ use super::multi_start::InitialGuess;
 use super::options::LocalOptimumChoice;
 use super::phases::{AttemptRun, SolveContext};
 use super::progress::{IterationRecord, SolvePhase};
-use super::report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
+use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
 use super::warm_start::MeshStart;
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;

@@ -1,6 +1,6 @@
 //! The results of a solve report that the gait determines.
 
-use super::report::SolveReport;
+use super::solve_report::SolveReport;
 use crate::body::WalkerModel;
 use crate::gait::{DomainTrajectory, Gait};
 use crate::gait_problem::objective::{cost_of_transport, mean_power};

@@ -233,7 +233,7 @@ impl InitialGuess {
         let settings = self.settings();
         let plain = tracked.program(false)?.with_timing(&self.timing.fractions());
         let postures = initial_guess::posture::solve(&plain, &settings, cancel);
-        let first = initial_guess::motion::guess(&plain, &postures, &settings);
+        let first = initial_guess::guessed_motion::guess(&plain, &postures, &settings);
         Ok((plain, first))
     }
 

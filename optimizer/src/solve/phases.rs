@@ -4,7 +4,7 @@ use super::error::SolveError;
 use super::multi_start::{InitialGuess, MuscleRoute};
 use super::options::SolveOptions;
 use super::progress::{IterationRecord, SolvePhase};
-use super::report::{CONVERGED_VIOLATION, LinearAlgebra};
+use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra};
 use crate::cancel_token::CancelToken;
 use crate::gait_problem::{GaitProblem, GaitProgram};
 use crate::initial_guess;
@@ -171,7 +171,7 @@ impl<'a> AttemptRun<'a> {
                 let settings = NlpSettings { mu_initial: MU_COST, ..rough };
                 tracked = self.phase(SolvePhase::PlainCost, &plain, &StartPoint::Cold(tracked.x), &settings)?;
             }
-            let with_muscles = initial_guess::muscles::guess(program, &plain, &tracked.x);
+            let with_muscles = initial_guess::guessed_muscles::guess(program, &plain, &tracked.x);
             if Self::interrupted(&tracked) {
                 return Ok(blank(program, with_muscles, tracked));
             }

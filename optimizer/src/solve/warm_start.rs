@@ -40,9 +40,9 @@ pub(super) fn on_mesh_of(
 ) -> Result<MeshStart, SolveError> {
     if warm.muscles != problem.muscles {
         return Err(SolveError::WarmStartShape(format!(
-            "it was solved {} muscles, but the problem is solved {} muscles",
-            if warm.muscles { "with" } else { "without" },
-            if problem.muscles { "with" } else { "without" }
+            "the gait has {}, but the problem has {}",
+            if warm.muscles { "muscles" } else { "no muscles" },
+            if problem.muscles { "muscles" } else { "none" }
         )));
     }
     if warm.mesh == problem.settings.mesh {

@@ -90,7 +90,7 @@ impl Figure {
                 standalone::svg(title, &inside, &[])
             }
             Drawing::Animation(title, animation) => {
-                let inside = Inside { class: "gait-figure", size: animation.size(), body: animation.body() };
+                let inside = Inside { class: "gait-walker", size: animation.size(), body: animation.body() };
                 standalone::svg(title, &inside, &[])
             }
             Drawing::Map(map) => {

@@ -1,18 +1,18 @@
 //! The charts of a gait.
 
-mod cycle;
 mod group;
+mod leg_cycle;
 mod legs;
-mod solve_progress;
+mod solve_charts;
 
 pub use group::Group;
-pub use solve_progress::solve;
+pub use solve_charts::solve;
 
-use crate::{Animation, Chart, Figure, LegCycle, Stroke, WalkerFigure, over_reference};
-use cycle::Cycle;
+use crate::{Animation, Chart, Figure, GaitWalker, LegCycle, Stroke, over_reference};
 use gait_optimizer::gait::stick_figure::StickFigure;
 use gait_optimizer::gait::{PhaseProgress, progress};
 use gait_optimizer::{Gait, ModelError, ReferenceGait};
+use leg_cycle::Cycle;
 
 /// The phases of the stride, in their order, for either leg.
 pub const PHASES: [(&str, &str); 4] = [
@@ -39,7 +39,7 @@ fn drawn(gait: &Gait) -> Gait {
 }
 
 /// The gait as a picture that moves, for download.
-pub fn animation(walker: WalkerFigure) -> Figure {
+pub fn animation(walker: GaitWalker) -> Figure {
     Figure::animation("Walking", Animation::new(walker))
 }
 

@@ -39,7 +39,7 @@ fn draw(svg: &mut String, figures: &[StickFigure]) -> std::fmt::Result {
         let share = tile as f64 / (TILES - 1) as f64;
         let Some(figure) = figures.iter().find(|figure| figure.time_s >= share * end - 1e-9) else { continue };
         let middle = WIDTH * (tile as f64 + 0.5);
-        write!(svg, "<g class=\"gait-figure\" transform=\"translate({middle} {GROUND})scale({SCALE})\">")?;
+        write!(svg, "<g class=\"gait-walker\" transform=\"translate({middle} {GROUND})scale({SCALE})\">")?;
         for part in &body {
             let place = part.segment.placement(figure).transform();
             write!(svg, "<path class=\"{}\" transform=\"{place}\" d=\"{}\"", part.class, part.outline)?;

@@ -41,4 +41,4 @@ pub use series::{Band, PointLink, Series, Stroke};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;
 pub use tree::{Tree, TreeNode};
-pub use walker::{Animation, Ghost, WalkerFigure};
+pub use walker::{Animation, GaitWalker, Ghost};

@@ -109,7 +109,7 @@ fn concerns_drawings(line: &str) -> bool {
     let tree = line.starts_with(".tree ") && !line.starts_with(".tree {") && !line.starts_with(".tree a:");
     chart
         || line.starts_with(".chart.map ")
-        || line.starts_with(".gait-figure ")
+        || line.starts_with(".gait-walker ")
         || line.starts_with(".tiles ")
         || tree
         || palette

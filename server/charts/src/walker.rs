@@ -4,12 +4,12 @@
 //! The script of the pages and the animation for download move the same outlines.
 
 mod animation;
-mod body;
-mod figure;
+mod body_outline;
+mod gait_walker;
 mod muscle_paths;
 mod segment;
 
 pub use animation::Animation;
-pub(crate) use body::parts;
-pub use figure::{Ghost, WalkerFigure};
+pub(crate) use body_outline::parts;
+pub use gait_walker::{GaitWalker, Ghost};
 pub(crate) use segment::UNITS_PER_M;

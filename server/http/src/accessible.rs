@@ -7,7 +7,7 @@ use super::AppState;
 use super::authorization::{RefusedRequest, permitted};
 use axum::extract::{FromRequestParts, RawPathParams};
 use axum::http::request::Parts;
-use gaitwright_service::access::{Permission, Reach};
+use gaitwright_service::access::{Reach, RequiredRight};
 use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
 use gaitwright_store::{
@@ -62,7 +62,7 @@ of_study!(LabSessionId, "lab session", async |db: &mut Connection, id| {
     StoreResult::Ok(lab_sessions::get(db, id).await?.study_id)
 });
 of_study!(MeasurementFileId, "measurement file", async |db: &mut Connection, id| {
-    let session = measurement_files::get(db, id).await?.session_id;
+    let session = measurement_files::get(db, id).await?.lab_session_id;
     StoreResult::Ok(lab_sessions::get(db, session).await?.study_id)
 });
 
@@ -134,7 +134,7 @@ pub(super) struct StudyOfPath(pub(super) Option<StudyId>);
 #[derive(Debug)]
 pub(crate) struct Id<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
-impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
+impl<T: Located, P: RequiredRight> FromRequestParts<AppState> for Id<T, P> {
     type Rejection = RefusedRequest;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, RefusedRequest> {
@@ -151,7 +151,7 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for Id<T, P> {
 #[derive(Debug)]
 pub(crate) struct DespiteWithdrawal<T, P>(pub(crate) T, pub(crate) PhantomData<P>);
 
-impl<T: Located, P: Permission> FromRequestParts<AppState> for DespiteWithdrawal<T, P> {
+impl<T: Located, P: RequiredRight> FromRequestParts<AppState> for DespiteWithdrawal<T, P> {
     type Rejection = RefusedRequest;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, RefusedRequest> {
@@ -163,7 +163,7 @@ impl<T: Located, P: Permission> FromRequestParts<AppState> for DespiteWithdrawal
 }
 
 /// Reads the identifier in the path and finds its study.
-pub(super) async fn in_path<T: Located, P: Permission>(
+pub(super) async fn in_path<T: Located, P: RequiredRight>(
     parts: &mut Parts,
     app: &AppState,
 ) -> Result<(T, Option<StudyId>), Error> {
@@ -179,7 +179,7 @@ pub(super) async fn in_path<T: Located, P: Permission>(
 }
 
 /// Reads the identifier in the path, and refuses it if its subject, or that of its study, withdrew consent.
-pub(super) async fn visible<T: Located, P: Permission>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
+pub(super) async fn visible<T: Located, P: RequiredRight>(parts: &mut Parts, app: &AppState) -> Result<T, Error> {
     let (id, study) = in_path::<T, P>(parts, app).await?;
     if let Some(study) = study {
         consents::may_be_shown(&mut *app.read().await?, study).await?;

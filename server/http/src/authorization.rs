@@ -6,7 +6,7 @@ use axum::extract::{FromRequestParts, OriginalUri};
 use axum::http::Extensions;
 use axum::http::request::Parts;
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Caller, Permission};
+use gaitwright_service::access::{Caller, RequiredRight};
 use gaitwright_service::error::Error;
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -49,18 +49,18 @@ pub(crate) fn not_signed_in() -> Error {
 }
 
 /// The caller of a request, if it has the right.
-pub(crate) fn permitted<P: Permission>(extensions: &Extensions) -> Result<Caller, Error> {
+pub(crate) fn permitted<P: RequiredRight>(extensions: &Extensions) -> Result<Caller, Error> {
     let caller = extensions.get::<Caller>().ok_or_else(not_signed_in)?;
     match P::NEEDED {
         Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
-            "You do not have permission for this (right `{}`). Ask an administrator.",
+            "This needs the right `{}`, which you do not have. Ask an administrator.",
             needed.as_str()
         ))),
         _ => Ok(caller.clone()),
     }
 }
 
-impl<P: Permission, S: Send + Sync> FromRequestParts<S> for Authorized<P> {
+impl<P: RequiredRight, S: Send + Sync> FromRequestParts<S> for Authorized<P> {
     type Rejection = RefusedRequest;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, RefusedRequest> {

@@ -1,4 +1,4 @@
-//! Motions for raters, without anything that identifies a gait: a fixed number of figures over one stride, from the
+//! Motions for raters, without anything that identifies a gait: a fixed number of stick figures over one stride, from the
 //! same position, starting at another phase in each pair.
 
 use gait_optimizer::Gait;
@@ -7,24 +7,24 @@ use gaitwright_service::error::Error;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-/// Number of figures of a stride. The last one is the first of the next stride.
-const FIGURES: usize = 101;
+/// Number of stick figures of a stride. The last one is the first of the next stride.
+const STICK_FIGURES: usize = 101;
 
-/// One figure: hip, shoulder, and knee, ankle, heel, toe of the left and the right leg; forward and up, m.
+/// One stick figure: hip, shoulder, and knee, ankle, heel, toe of the left and the right leg; forward and up, m.
 #[derive(Debug, Serialize)]
-pub(crate) struct BlindFigure([[f64; 2]; 10]);
+pub(crate) struct BlindStickFigure([[f64; 2]; 10]);
 
 /// The phase at which both motions of a pair start, as a fraction of the stride. It differs between pairs, so that no
 /// motion has the same bytes as an earlier one. A rater may still recognise a gait by its movement.
-pub(crate) fn phase(token: &str) -> f64 {
-    let digest = Sha256::digest(token.as_bytes());
+pub(crate) fn phase(code: &str) -> f64 {
+    let digest = Sha256::digest(code.as_bytes());
     let number = digest.iter().take(6).fold(0_u64, |number, byte| (number << 8) | u64::from(*byte));
     number as f64 / (1_u64 << 48) as f64
 }
 
 /// The motion of a gait for a rater.
-pub(crate) fn blind_motion(gait: &Gait, phase: f64) -> Result<Vec<BlindFigure>, Error> {
-    Ok(blind_stride(gait, phase)?.iter().map(BlindFigure::of).collect())
+pub(crate) fn blind_motion(gait: &Gait, phase: f64) -> Result<Vec<BlindStickFigure>, Error> {
+    Ok(blind_stride(gait, phase)?.iter().map(BlindStickFigure::of).collect())
 }
 
 /// The same, as stick figures.
@@ -36,7 +36,7 @@ pub(crate) fn blind_stride(gait: &Gait, phase: f64) -> Result<Vec<StickFigure>, 
     let (stride_s, stride_m) = (last.time_s - first.time_s, last.hip[0] - first.hip[0]);
     let origin = between(&figures, first.time_s + stride_s * phase).hip[0];
     let at = |index: usize| {
-        let share = index as f64 / (FIGURES - 1) as f64;
+        let share = index as f64 / (STICK_FIGURES - 1) as f64;
         let (place, next_stride) = if phase + share > 1.0 { (phase + share - 1.0, 1.0) } else { (phase + share, 0.0) };
         let figure = between(&figures, first.time_s + stride_s * place);
         let moved = |[x, z]: [f64; 2]| [millimetres(x + next_stride * stride_m - origin), millimetres(z)];
@@ -54,7 +54,7 @@ pub(crate) fn blind_stride(gait: &Gait, phase: f64) -> Result<Vec<StickFigure>, 
             right: leg(&figure.right),
         }
     };
-    Ok((0..FIGURES).map(at).collect())
+    Ok((0..STICK_FIGURES).map(at).collect())
 }
 
 /// Interpolates the figure at a time.
@@ -79,7 +79,7 @@ fn between(figures: &[StickFigure], time: f64) -> StickFigure {
     }
 }
 
-impl BlindFigure {
+impl BlindStickFigure {
     fn of(figure: &StickFigure) -> Self {
         let (l, r) = (&figure.left, &figure.right);
         Self([figure.hip, figure.shoulder, l.knee, l.ankle, l.heel, l.toe, r.knee, r.ankle, r.heel, r.toe])

@@ -14,7 +14,7 @@ use axum::http::request::Parts;
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
-use gaitwright_service::access::Permission;
+use gaitwright_service::access::RequiredRight;
 use gaitwright_store::{StudyId, consents, members};
 use std::convert::Infallible;
 use std::marker::PhantomData;
@@ -39,7 +39,7 @@ pub(crate) struct StudyListener<P> {
     right: PhantomData<P>,
 }
 
-impl<P: Permission> FromRequestParts<AppState> for StudyListener<P> {
+impl<P: RequiredRight> FromRequestParts<AppState> for StudyListener<P> {
     type Rejection = Response;
 
     async fn from_request_parts(parts: &mut Parts, app: &AppState) -> Result<Self, Response> {
@@ -51,7 +51,7 @@ impl<P: Permission> FromRequestParts<AppState> for StudyListener<P> {
     }
 }
 
-impl<P: Permission> StudyListener<P> {
+impl<P: RequiredRight> StudyListener<P> {
     /// The study.
     pub(crate) fn study(&self) -> StudyId {
         self.study
@@ -114,7 +114,7 @@ pub(crate) struct Sender<P> {
     asked: Option<Instant>,
 }
 
-impl<P: Permission> Sender<P> {
+impl<P: RequiredRight> Sender<P> {
     /// Sends an event.
     pub(crate) async fn send(&mut self, event: Event) -> Result<(), ListenerGone> {
         if self.asked.is_none_or(|asked| asked.elapsed() > HOLDS_FOR) {

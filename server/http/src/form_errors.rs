@@ -36,9 +36,9 @@ const LABELS: &[(&str, &str)] = &[
     ("band_high_hz", "Band-pass to, Hz"),
     ("envelope_hz", "Low-pass cut-off, Hz"),
     ("order", "Filter order"),
-    ("walks", "Number of walks on each ground"),
+    ("simulated_walks", "Number of simulated walks on each ground"),
     ("seed", "Seed"),
-    ("trial_budget", "Total number of trials"),
+    ("number_of_trials", "Number of trials"),
     ("form", "Signed consent form"),
     ("rater", "Rater"),
 ];

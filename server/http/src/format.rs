@@ -8,11 +8,11 @@ use gaitwright_service::access::Role;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{FeedbackRow, Source};
 use gaitwright_store::measurement_files::MeasurementKind;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use std::fmt::Display;
 
 /// A figure with four decimals, or a dash.
-pub(crate) fn figure(value: Option<f64>) -> String {
+pub(crate) fn decimal(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
 }
 
@@ -90,18 +90,18 @@ pub(crate) fn variant(muscles: bool) -> &'static str {
     if muscles { "with muscles" } else { "without muscles" }
 }
 
-/// Who answers the comparisons.
-pub(crate) fn answers_by(mode: FeedbackMode) -> &'static str {
-    match mode {
-        FeedbackMode::Automatic => "Gait RMSE",
-        FeedbackMode::Human => "people",
-        FeedbackMode::Mixed => "Gait RMSE and people",
+/// The source of answers.
+pub(crate) fn answer_source(source: AnswerSource) -> &'static str {
+    match source {
+        AnswerSource::GaitRmse => "Gait RMSE",
+        AnswerSource::People => "people",
+        AnswerSource::Both => "both Gait RMSE and people",
     }
 }
 
 /// What a study waits for besides its solves; empty if it waits for solves only.
-pub(crate) fn also_waits_for(mode: FeedbackMode) -> &'static str {
-    if mode == FeedbackMode::Human { ", plus the time that people need to answer" } else { "" }
+pub(crate) fn also_waits_for(source: AnswerSource) -> &'static str {
+    if source == AnswerSource::People { ", plus the time that people need to answer" } else { "" }
 }
 
 /// The answer of the subject in a lab session; first is walk 2.
@@ -154,7 +154,7 @@ pub(crate) fn role(role: &Role) -> &'static str {
 pub(crate) fn file_kind(kind: &MeasurementKind) -> &'static str {
     match kind {
         MeasurementKind::Emg => "EMG recording",
-        MeasurementKind::Motion => "joint angles",
+        MeasurementKind::JointAngles => "joint angles",
     }
 }
 

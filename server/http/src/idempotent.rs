@@ -9,7 +9,7 @@ use axum::body::Bytes;
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Caller, Permission};
+use gaitwright_service::access::{Caller, RequiredRight};
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::idempotency::{self, KEY_UNIQUE, StoredResponse, fingerprint};
@@ -42,7 +42,7 @@ pub(crate) struct IdempotentWith<P, T>(pub(crate) Idempotent<P>, pub(crate) T);
 #[derive(Debug, Clone)]
 pub(crate) struct StoredBody(pub(crate) String);
 
-impl<P: Permission> Idempotent<P> {
+impl<P: RequiredRight> Idempotent<P> {
     /// Begins the transaction of the effect. The inner `Err` is the stored response of an earlier request with the key.
     pub(crate) async fn begin<'a>(&self, app: &'a AppState) -> Result<Result<BorrowedWriter<'a>, Response>, Error> {
         let mut writer = app.write().await?;
@@ -161,7 +161,7 @@ fn response(kept: &StoredResponse) -> Response {
     response
 }
 
-async fn read<P: Permission, S: Send + Sync>(
+async fn read<P: RequiredRight, S: Send + Sync>(
     request: Request,
     state: &S,
 ) -> Result<(Idempotent<P>, Method, HeaderMap, Bytes), Error> {
@@ -181,7 +181,7 @@ async fn read<P: Permission, S: Send + Sync>(
     Ok((idempotent, method, headers, bytes))
 }
 
-impl<P: Permission, S: Send + Sync> FromRequest<S> for Idempotent<P> {
+impl<P: RequiredRight, S: Send + Sync> FromRequest<S> for Idempotent<P> {
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
@@ -189,7 +189,7 @@ impl<P: Permission, S: Send + Sync> FromRequest<S> for Idempotent<P> {
     }
 }
 
-impl<P: Permission, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for IdempotentWith<P, T> {
+impl<P: RequiredRight, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for IdempotentWith<P, T> {
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {

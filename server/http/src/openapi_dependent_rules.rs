@@ -12,14 +12,14 @@ const BOUNDS: &str = "a3 is smaller than a4 by 0.001 or more.";
 const SPACE: &str = "Each bound has at most one dimension. The values of a dimension increase, each within the range of the \
                      bound. Its lengthscale lies between a hundredth of the smallest step between the values and 10,000 times \
                      their range. The smallest a4 exceeds the largest a3 by 0.001 or more.";
-const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise scales and `tie_width` are 1e-3 to 1e3 times the \
+const LEARNER: &str = "`nugget` is 1e-10 to 1 times `signal_variance`. Noise scales and `no_difference_width` are 1e-3 to 1e3 times the \
                        square root of `signal_variance`, and the threshold is at most 10 times that square root. \
                        `expectation_propagation` needs the link `probit`.";
 const EXISTS: &str = "An existing object.";
 const LIMITS: &str = "Each lower limit is smaller than its upper limit.";
 const EMG_FILE: &str = "A file in the format that `format` names, with the columns of the muscles, sampled at 100 Hz or more, with one whole \
                         stride or more. It has all columns and heel strikes that are named in the request.";
-const MOTION_FILE: &str = "A file in the format that `format` names, with the angle of at least one joint over several strides, as `/help/data-files` describes it.";
+const JOINT_ANGLE_FILE: &str = "A file in the format that `format` names, with the angle of at least one joint over several strides, as `/help/data-files` describes it.";
 const REFERENCE_FILE: &str = "A file in the format that `format` names, with its columns, as `/help/data-files` describes it: five \
                               joint angles over at least one whole stride of a walking person. It has all columns and heel \
                               strikes that are named in the request.";
@@ -47,10 +47,10 @@ const RULES: [(&str, &str, &str); 27] = [
     ("NewStudy", "search_space", SPACE),
     ("NewStudy", "gait_settings", LIMITS),
     ("NewStudy", "learner", LEARNER),
-    ("Extend", "trial_budget", "More than the current budget."),
+    ("StudyExtension", "number_of_trials", "More than the current number of trials."),
     ("NewMember", "name", "The name of a user who is not disabled, or of a token that is not revoked."),
-    ("Invitation", "name", "The name of a rater, or one that is not taken."),
-    ("Unblind", "rater", "A rater who was shown a pair of this study."),
+    ("RaterInvitation", "name", "The name of a rater, or one that is not taken."),
+    ("RaterUnblinding", "rater", "A rater who was shown a pair of this study."),
     ("NewSafetyReview", "reports", "Includes every safety report in force about the gait of this trial."),
     ("NewEmg", "recording", EMG_FILE),
     (
@@ -58,11 +58,11 @@ const RULES: [(&str, &str, &str); 27] = [
         "reading",
         "An OpenSim file has no `rate_hz`. Heel strikes are given as two or more times in seconds, or as a column instead.",
     ),
-    ("NewMotion", "recording", MOTION_FILE),
-    ("NewMotion", "reading", "`cutoff_hz` is at most 0.45 times the sampling rate."),
+    ("NewJointAngles", "recording", JOINT_ANGLE_FILE),
+    ("NewJointAngles", "reading", "`cutoff_hz` is at most 0.45 times the sampling rate."),
     ("NewReferenceGait", "recording", REFERENCE_FILE),
     (
-        "Processing",
+        "EmgProcessing",
         "settings",
         "`band_high_hz` exceeds `band_low_hz` by 1 or more, and is at most 0.495 times the sampling rate. The other \
          frequencies are at most 0.45 times the sampling rate.",

@@ -48,8 +48,8 @@ const LEARNER: [Described; 21] = [
         "Threshold between the labels *not converged* and *converged*, in units of utility.",
     ),
     ("LearnerSettings", "coactive_noise", "Noise scale of suggestions, in units of utility."),
-    ("LearnerSettings", "tie_noise", "Noise scale of ties, in units of utility."),
-    ("LearnerSettings", "tie_width", "Difference in utility below which two gaits feel equal."),
+    ("LearnerSettings", "no_difference_noise", "Noise scale of answers of no difference, in units of utility."),
+    ("LearnerSettings", "no_difference_width", "Difference in utility below which two gaits feel equal."),
     (
         "LearnerSettings",
         "avoidance",

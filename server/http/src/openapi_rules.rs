@@ -18,7 +18,7 @@ use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Sub
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
-use gaitwright_store::trials_table::SORTS;
+use gaitwright_store::trial_query::SORTS;
 use serde_json::{Map, Value, json};
 
 /// Control characters other than tab and line breaks, and characters that change the direction of text.
@@ -29,12 +29,12 @@ const UNPRINTABLE: &str =
 const NAMES: [(&str, &str, u32); 12] = [
     ("NewUser", "name", 80),
     ("NewToken", "name", 80),
-    ("Invitation", "name", 80),
+    ("RaterInvitation", "name", 80),
     ("NewMember", "name", 120),
     ("NewStudy", "name", 120),
-    ("Change", "name", 120),
+    ("StudyChange", "name", 120),
     ("StudyClone", "name", 120),
-    ("Ask", "script", 80),
+    ("AskRequest", "script", 80),
     ("NewPreference", "author", 80),
     ("NewAssessment", "author", 80),
     ("NewSafetyReport", "author", 80),
@@ -42,7 +42,7 @@ const NAMES: [(&str, &str, u32); 12] = [
 ];
 
 /// Parameters with rules.
-const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "token", "ids", "x", "y"];
+const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "x", "y"];
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
@@ -59,18 +59,25 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             let rule = json!({ "minLength": 1, "maxLength": longest, "pattern": one_line });
             schemas.add(component, field, &rule);
         }
-        for component in ["NewSafetyReview", "Retract"] {
+        for component in ["NewSafetyReview", "AnswerRetraction"] {
             schemas.add(component, "author", &json!({ "minLength": 1, "maxLength": 80, "pattern": one_line }));
         }
-        for component in ["NewSafetyReview", "Withdrawal", "NewCorrection", "Unblind", "Retract", "UnblindSession"] {
+        for component in [
+            "NewSafetyReview",
+            "ConsentWithdrawal",
+            "NewCorrection",
+            "RaterUnblinding",
+            "AnswerRetraction",
+            "LabSessionUnblinding",
+        ] {
             schemas.add(component, "reason", &json!({ "minLength": 1, "maxLength": 2000, "pattern": needed }));
         }
         schemas.add("NewConsent", "form", &json!({ "pattern": needed }));
-        schemas.add("Change", "notes", &json!({ "pattern": optional }));
+        schemas.add("StudyChange", "notes", &json!({ "pattern": optional }));
         // A comma separates tags in the form.
         let tag = format!(r"^[^,\t\r\n{UNPRINTABLE}]*[^,\s{UNPRINTABLE}][^,\t\r\n{UNPRINTABLE}]*$");
         let tag = json!({ "type": "string", "minLength": 1, "maxLength": 40, "pattern": tag });
-        schemas.add("Change", "tags", &json!({ "items": tag }));
+        schemas.add("StudyChange", "tags", &json!({ "items": tag }));
         for component in [
             "NewPreference",
             "NewAssessment",
@@ -79,11 +86,11 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             "RaterAnswer",
             "NewLabAnswer",
             "RecordedWalk",
-            "Closing",
+            "LabSessionClosing",
         ] {
             schemas.add(component, "note", &json!({ "maxLength": 2000, "pattern": optional }));
         }
-        for component in ["Tell", "TransitionReason"] {
+        for component in ["TellRequest", "StateChangeReason"] {
             schemas.add(component, "reason", &json!({ "maxLength": 2000, "pattern": optional }));
         }
         for component in ["NewSubject", "NewLabSession"] {
@@ -109,9 +116,9 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             schemas.set(component, "answer", answers.clone());
         }
         for field in ["gait_rmse_rad", "cost_of_transport"] {
-            schemas.add("Tell", field, &json!({ "minimum": 0, "exclusiveMaximum": 1e6 }));
+            schemas.add("TellRequest", field, &json!({ "minimum": 0, "exclusiveMaximum": 1e6 }));
         }
-        if let Some(tell) = schemas.component("Tell") {
+        if let Some(tell) = schemas.component("TellRequest") {
             let reason = json!({ "required": ["reason"], "properties": { "reason": { "pattern": r"\S" } } });
             let rmse =
                 json!({ "required": ["gait_rmse_rad"], "properties": { "gait_rmse_rad": { "type": "number" } } });
@@ -120,12 +127,12 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             tell.insert("else".to_owned(), reason);
         }
         schemas.add("NewReferenceGait", "name", &json!({ "minLength": 1, "maxLength": 200, "pattern": one_line }));
-        for component in ["NewReferenceGait", "NewEmg", "NewMotion"] {
+        for component in ["NewReferenceGait", "NewEmg", "NewJointAngles"] {
             schemas.add(component, "recording", &json!({ "minLength": 1 }));
         }
         schemas.add("NewReferenceGait", "format", &json!({ "default": "opensim" }));
         schemas.add("EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
-        schemas.add("MotionReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
+        schemas.add("JointAngleReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
         schemas.add("Suggestion", "bounds", &bounds);
@@ -136,7 +143,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         }
         for component in ["NewStudy", "StudyClone"] {
             schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
-            schemas.add(component, "trial_budget", &json!({ "minimum": 1, "maximum": 10_000 }));
+            schemas.add(component, "number_of_trials", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
         schemas.add("NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
         schemas.add("NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
@@ -192,7 +199,8 @@ fn state_bounds(schemas: &mut Schemas<'_>) {
     for (bound, name) in TunedBounds::NAMES.iter().enumerate() {
         let side = if TunedBounds::IS_LOWER[bound] { "Minimum" } else { "Maximum" };
         // Two meanings name the side themselves.
-        let quantity = TunedBounds::MEANINGS[bound].replace(" lower bound", "").replace(" upper bound", "");
+        let meaning = TunedBounds::MEANINGS[bound];
+        let quantity = meaning.trim_start_matches("minimum ").trim_start_matches("maximum ");
         let meaning = format!("{side} {quantity}.");
         let (least, most) = TunedBounds::RANGES[bound];
         let mut schema = number(&meaning, least, most, &json!("number"));
@@ -282,8 +290,8 @@ fn learner(missed: &mut Vec<String>) -> Value {
             preference_noise: usual.preference_noise * deviation,
             ordinal_noise: usual.ordinal_noise * deviation,
             coactive_noise: usual.coactive_noise * deviation,
-            tie_noise: usual.tie_noise * deviation,
-            tie_width: usual.tie_width * deviation,
+            no_difference_noise: usual.no_difference_noise * deviation,
+            no_difference_width: usual.no_difference_width * deviation,
             ordinal_thresholds: usual.ordinal_thresholds.iter().map(|threshold| threshold * deviation).collect(),
             ..usual.clone()
         };
@@ -343,7 +351,7 @@ fn state_parameter(parameter: &mut Value) {
             let names: Vec<String> = SORTS.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
             json!({ "enum": names })
         }
-        "token" => json!({ "pattern": "^[0-9a-f]{64}$" }),
+        "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => {
             let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
             json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })

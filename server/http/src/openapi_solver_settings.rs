@@ -39,8 +39,8 @@ const NUMBERS: [(&str, f64, f64, &str); 5] = [
 const COUNTS: [(&str, &str); 3] = [
     (
         "regularisation_memory",
-        "Number of iterations that begin with a decreasing regularisation after the unregularised matrix has had the \
-         wrong inertia twice in a row, one more for each further time. Default 4.",
+        "After the unregularised matrix has had the wrong inertia twice in a row, this many iterations start from a \
+         reduced regularisation. Each further time adds one iteration. Default 4.",
     ),
     ("max_second_order_corrections", "Maximum number of second-order corrections in each iteration. Default 1."),
     (

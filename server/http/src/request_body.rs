@@ -11,10 +11,10 @@ use gaitwright_service::error::Error;
 const UPLOADS: [&str; 6] = [
     "/reference-gaits",
     "/lab-sessions/{id}/measurement-files/emg",
-    "/lab-sessions/{id}/measurement-files/motion",
+    "/lab-sessions/{id}/measurement-files/joint-angles",
     "/api/v1/reference-gaits",
     "/api/v1/lab-sessions/{id}/measurement-files/emg",
-    "/api/v1/lab-sessions/{id}/measurement-files/motion",
+    "/api/v1/lab-sessions/{id}/measurement-files/joint-angles",
 ];
 
 /// The largest body, bytes.

@@ -1,7 +1,7 @@
 //! The router: all routes, and the layers around them.
 
 use super::{
-    AppState, access_log, api, authentication, client_address, host_header, metrics, openapi, page_error, pages,
+    AppState, access_log_layer, api, authentication, client_address, host_header, metrics, openapi, page_error, pages,
     responses, same_origin, saved_as, static_files,
 };
 use crate::problem_details::Refusal;
@@ -45,9 +45,9 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
     };
     routes
         .layer(middleware::from_fn(saved_as::name))
-        .layer(middleware::from_fn(access_log::add_caller))
+        .layer(middleware::from_fn(access_log_layer::add_caller))
         .layer(middleware::from_fn_with_state(state.clone(), authentication::identify))
-        .layer(middleware::from_fn_with_state(state.clone(), access_log::note))
+        .layer(middleware::from_fn_with_state(state.clone(), access_log_layer::note))
         .layer(middleware::from_fn_with_state(state.clone(), metrics::count))
         .layer(middleware::from_fn(same_origin::check))
         .layer(middleware::from_fn_with_state(state.hosts.clone(), host_header::check))

@@ -10,7 +10,7 @@ use gaitwright_service::access::secret::PasswordCheckQueues;
 use gaitwright_service::access::sign_in::SessionLimits;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::job_status::Runners;
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_store::{BorrowedWriter, Instant, Reader, Store, StoreResult, access_clock};
@@ -30,7 +30,7 @@ pub struct AppState {
     /// Counts of requests.
     pub requests: Arc<Requests>,
     /// Cached posteriors of studies.
-    pub beliefs: Arc<Beliefs>,
+    pub analyses: Arc<Analyses>,
     /// The host names of the service.
     pub hosts: Hosts,
     /// The trusted reverse proxies.
@@ -86,10 +86,10 @@ impl AccessState {
 impl AppState {
     /// Creates the state of a service.
     pub fn new(scheduler: Scheduler, access: Arc<AccessState>, backups: Arc<Backups>, hosts: Hosts) -> Self {
-        let beliefs = Arc::clone(scheduler.beliefs());
+        let analyses = Arc::clone(scheduler.analyses());
         let store = scheduler.store().with_own_pool();
         let (requests, proxies) = (Arc::default(), Proxies::default());
-        Self { scheduler, access, requests, beliefs, hosts, proxies, slowest_answer: SLOWEST_ANSWER, backups, store }
+        Self { scheduler, access, requests, analyses, hosts, proxies, slowest_answer: SLOWEST_ANSWER, backups, store }
     }
 
     /// What runs jobs.

@@ -95,12 +95,20 @@ impl Units {
 
     /// What can be typed as a height.
     pub(crate) fn height_help(self) -> &'static str {
-        if self == Self::Si { "1.4 to 2.2, or as 5 ft 8 in" } else { "4 ft 8 in to 7 ft 2 in, or as 1.73 m" }
+        if self == Self::Si {
+            "1.4 to 2.2, or in feet and inches, such as 5 ft 8 in"
+        } else {
+            "4 ft 8 in to 7 ft 2 in, or in metres, such as 1.73 m"
+        }
     }
 
     /// What can be typed as a body mass.
     pub(crate) fn mass_help(self) -> &'static str {
-        if self == Self::Si { "35 to 160, or as 145 lb" } else { "78 to 352 lb, or as 65.7 kg" }
+        if self == Self::Si {
+            "35 to 160, or in pounds, such as 145 lb"
+        } else {
+            "78 to 352 lb, or in kilograms, such as 65.7 kg"
+        }
     }
 
     /// An exact height in a field, which is not rounded to an inch.

@@ -116,7 +116,7 @@ impl Backups {
         // Read before the audit trail, because a backup leaves this table after its row is written.
         let progress = self.table().get(&id).cloned();
         let rows = audit::of_object(db, &object(id)).await?;
-        let has = |action: &str| rows.iter().any(|row| row.action == action);
+        let has = |change: &str| rows.iter().any(|row| row.change == change);
         Ok(match progress {
             _ if rows.is_empty() => None,
             _ if has(COMPLETE) => Some((JobState::Done, None)),
@@ -147,11 +147,11 @@ impl Backups {
 /// [`Error::NotFound`] if there is none; errors of the database.
 pub async fn get(db: &mut Connection, id: BackupId) -> Result<Backup, Error> {
     let rows = audit::of_object(db, &object(id)).await?;
-    let complete = rows.into_iter().find(|row| row.action == COMPLETE);
-    let AuditRow { detail, at, .. } =
+    let complete = rows.into_iter().find(|row| row.change == COMPLETE);
+    let AuditRow { detail, created_at, .. } =
         complete.ok_or_else(|| Error::NotFound { what: "backup".to_owned(), id: id.to_string() })?;
     let file = detail["file"].as_str().unwrap_or_default().to_owned();
-    Ok(Backup { id, file, bytes: detail["bytes"].as_u64().unwrap_or_default(), created_at: at })
+    Ok(Backup { id, file, bytes: detail["bytes"].as_u64().unwrap_or_default(), created_at })
 }
 
 /// Records that a backup is cancelled.
@@ -192,7 +192,7 @@ impl Requested {
         let mut unrecorded = Unrecorded(Some(file));
         let mut writer = store.write().await?;
         let object = object(self.id);
-        if audit::of_object(&mut writer, &object).await?.iter().any(|row| row.action == CANCELLED) {
+        if audit::of_object(&mut writer, &object).await?.iter().any(|row| row.change == CANCELLED) {
             return Ok(());
         }
         audit::append(&mut writer, actor, COMPLETE, &object, &json!({ "file": name, "bytes": bytes })).await?;

@@ -54,7 +54,7 @@ pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error>
     let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
     match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {
         Some(c) => {
-            Err(Error::invalid(field, c.escape_unicode().to_string(), "text of printable characters and line breaks"))
+            Err(Error::invalid(field, c.escape_unicode().to_string(), "printable characters and line breaks only"))
         }
         None => Ok(()),
     }

@@ -58,7 +58,7 @@ impl Tasks {
             let run = AbortOnDropHandle::new(tokio::spawn(stop.clone().run_until_cancelled_owned(task)));
             let reason = match run.await {
                 Ok(None) => return,
-                Ok(Some(Ok(()))) => "it ended".to_owned(),
+                Ok(Some(Ok(()))) => "it stopped without an error".to_owned(),
                 Ok(Some(Err(error))) => error.to_string(),
                 Err(error) => words_of(error),
             };

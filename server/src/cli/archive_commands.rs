@@ -13,7 +13,7 @@ use gaitwright_store::audit::Actor;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub(super) struct Export {
+pub(super) struct ExportCommand {
     /// Identifier of the study.
     #[arg(value_parser = study)]
     study: StudyId,
@@ -31,7 +31,7 @@ fn study(text: &str) -> Result<StudyId, String> {
     text.parse().map_err(|_| "must be the identifier of a study, as in the address of its page".to_owned())
 }
 
-impl Export {
+impl ExportCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let database = settings.database();
         exists(&database)?;
@@ -45,7 +45,7 @@ impl Export {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Import {
+pub(super) struct ImportCommand {
     /// Archive made by `gaitwright export` or downloaded from the service.
     #[arg(value_name = "FILE")]
     from: PathBuf,
@@ -56,7 +56,7 @@ pub(super) struct Import {
     trust: Vec<PublicKey>,
 }
 
-impl Import {
+impl ImportCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let cannot = |e: std::io::Error| Error::Malformed(format!("Cannot read {}: {e}.", self.from.display()));
         let file = std::fs::File::open(&self.from).map_err(cannot)?;
@@ -70,13 +70,13 @@ impl Import {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct NewKey {
+pub(super) struct SigningKeyCommand {
     /// New file for the private key, which only its owner can read.
     #[arg(value_name = "FILE")]
     to: PathBuf,
 }
 
-impl NewKey {
+impl SigningKeyCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let text = SigningKey::generate()?;
         let public = SigningKey::read(&text)?.public();

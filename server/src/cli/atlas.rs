@@ -18,7 +18,7 @@ use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub(super) struct Atlas {
+pub(super) struct AtlasCommand {
     #[command(flatten)]
     flags: ProblemFlags,
     #[command(flatten)]
@@ -32,7 +32,7 @@ pub(super) struct Atlas {
     workers: Option<usize>,
 }
 
-impl Atlas {
+impl AtlasCommand {
     pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let problem = self.flags.problem(TunedBounds::default())?;
         let options = self.multi_start.applied_to(self.flags.options()?)?;

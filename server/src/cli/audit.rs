@@ -8,13 +8,13 @@ use gaitwright_service::error::Error;
 use gaitwright_store::verify;
 
 #[derive(Debug, Args)]
-pub(super) struct Audit {
+pub(super) struct AuditCommand {
     #[command(subcommand)]
-    what: AuditCommand,
+    what: AuditSubcommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum AuditCommand {
+enum AuditSubcommand {
     /// Verify a record: its file, its schema, its hash chains, the seal of every row, and its anchors. Reports rows
     /// that were changed, added or deleted outside the program.
     Verify {
@@ -23,9 +23,9 @@ enum AuditCommand {
     },
 }
 
-impl Audit {
+impl AuditCommand {
     pub(super) fn record(&self) -> &AnchoredFlags {
-        let AuditCommand::Verify { record } = &self.what;
+        let AuditSubcommand::Verify { record } = &self.what;
         record
     }
 

@@ -9,7 +9,7 @@ use gaitwright_store::{backup, restore};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub(super) struct Backup {
+pub(super) struct BackupCommand {
     /// New file for the backup.
     #[arg(value_name = "FILE")]
     to: PathBuf,
@@ -17,7 +17,7 @@ pub(super) struct Backup {
     pub(super) record: RecordFlags,
 }
 
-impl Backup {
+impl BackupCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let database = settings.database();
         exists(&database)?;
@@ -32,7 +32,7 @@ impl Backup {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Restore {
+pub(super) struct RestoreCommand {
     /// Backup made by `gaitwright backup` or by the service.
     #[arg(value_name = "FILE")]
     from: PathBuf,
@@ -40,7 +40,7 @@ pub(super) struct Restore {
     pub(super) record: AnchoredFlags,
 }
 
-impl Restore {
+impl RestoreCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let database = settings.database();
         exists(&self.from)?;

@@ -11,7 +11,7 @@ use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub(super) struct Certify {
+pub(super) struct CertifyCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
@@ -24,13 +24,13 @@ pub(super) struct Certify {
     json: bool,
 }
 
-impl Certify {
+impl CertifyCommand {
     /// Certifies the gait. A failed certificate is a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let GaitFile { gait, report } = read_gait_file(&self.gait)?;
         let reference = reference_of(self.reference.as_deref())?;
         if let Some(report) = report {
-            check_figures(&gait, &report, &reference)
+            check_values(&gait, &report, &reference)
                 .map_err(|reason| Error::Malformed(format!("Cannot certify {}: {reason}", self.gait.display())))?;
         }
         let certificate = Pool::new(1).run(move |_| certify(&gait)).await??;
@@ -43,10 +43,10 @@ impl Certify {
     }
 }
 
-/// Checks the figures that a file states against those of its gait. The error is the reason.
-fn check_figures(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
-    let figures = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
-    match figures.difference(&GaitResults::of_report(report)) {
+/// Checks the results that a file states against those of its gait. The error is the reason.
+fn check_values(gait: &Gait, report: &SolveReport, reference: &ReferenceGait) -> Result<(), String> {
+    let results = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
+    match results.difference(&GaitResults::of_report(report)) {
         None => Ok(()),
         Some((name, computed, stated)) if name.starts_with("gait_rmse") => Err(format!(
             "the file says that {name} is {stated}; with the reference gait {:?} it is {computed}. If the solve \
@@ -64,7 +64,12 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     let mut lines = vec![format!("certificate: {}", if certificate.passed { "passed" } else { "failed" })];
     if let Some(certified) = &certificate.certified {
         lines.push(format!("  gait {}, {}", certified.gait_sha256, certified.walker_in_words()));
-        lines.extend(certified.differences.iter().map(|difference| format!("  differs: {}", difference.in_words())));
+        lines.extend(
+            certified
+                .differences
+                .iter()
+                .map(|difference| format!("  differs from the built-in problem: {}", difference.in_words())),
+        );
         lines.push(format!(
             "  cost of transport {:.4} (from absolute joint powers, which the objective smooths)",
             certified.unsmoothed_cost_of_transport

@@ -5,13 +5,13 @@ use clap::{Args, Subcommand};
 
 /// `gaitwright config`.
 #[derive(Debug, Args)]
-pub(super) struct Config {
+pub(super) struct ConfigCommand {
     #[command(subcommand)]
-    what: ConfigCommand,
+    what: ConfigSubcommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum ConfigCommand {
+enum ConfigSubcommand {
     /// Show every setting of `gaitwright serve`, its value and where the value comes from.
     Show {
         #[command(flatten)]
@@ -19,9 +19,9 @@ enum ConfigCommand {
     },
 }
 
-impl Config {
+impl ConfigCommand {
     pub(super) fn flags(&self) -> Flags {
-        let ConfigCommand::Show { flags } = &self.what;
+        let ConfigSubcommand::Show { flags } = &self.what;
         (**flags).clone()
     }
 }

@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use gait_optimizer::export::motion_file;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gaitwright_charts::gait_table::gait_csv;
-use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
+use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
 
@@ -28,14 +28,14 @@ enum TargetFormat {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Convert {
+pub(super) struct ConvertCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
     /// Target format.
     #[arg(long, value_enum, value_name = "FORMAT")]
     to: TargetFormat,
-    /// Sampling rate of `mot`, 10 to 5000.
+    /// Sampling rate of the `mot` file, Hz, 10 to 5000.
     #[arg(long, value_name = "HZ", default_value = "200", value_parser = number, allow_negative_numbers = true)]
     rate_hz: f64,
     /// Output file (default: standard output).
@@ -43,7 +43,7 @@ pub(super) struct Convert {
     out: Option<PathBuf>,
 }
 
-impl Convert {
+impl ConvertCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let gait = read_gait_file(&self.gait)?.gait;
         let out = OutFile::instead_of_stdout(self.out.as_deref(), &[&self.gait])?;
@@ -53,7 +53,7 @@ impl Convert {
                 motion_file(&gait, self.rate_hz).map_err(|error| of_flags(error, &[("rate_hz", "--rate-hz")]))?
             }
             TargetFormat::Tiles => Figure::tiles("The stride", stick_figures(&gait)?).svg(),
-            TargetFormat::Animation => gait_charts::animation(WalkerFigure::new(&gait)?).svg(),
+            TargetFormat::Animation => gait_charts::animation(GaitWalker::new(&gait)?).svg(),
         };
         match out {
             Some(out) => out.write(&text),

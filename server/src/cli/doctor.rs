@@ -14,7 +14,7 @@ use std::thread::available_parallelism;
 const CLOCKS_DIFFER_S: i64 = 5;
 
 #[derive(Debug, Args)]
-pub(super) struct Doctor {
+pub(super) struct DoctorCommand {
     #[command(flatten)]
     flags: Box<Flags>,
 }
@@ -26,7 +26,7 @@ enum CheckOutcome {
 }
 use CheckOutcome::{Good, Trouble};
 
-impl Doctor {
+impl DoctorCommand {
     pub(super) fn flags(&self) -> Flags {
         (*self.flags).clone()
     }
@@ -102,6 +102,7 @@ async fn clock_after(database: &Path) -> CheckOutcome {
     }
 }
 
+#[cfg_attr(not(feature = "nats"), allow(clippy::unused_async, reason = "only the check of a broker waits"))]
 async fn broker(settings: &Settings) -> Result<CheckOutcome, Error> {
     match settings.nats()? {
         #[cfg(feature = "nats")]
@@ -109,6 +110,8 @@ async fn broker(settings: &Settings) -> Result<CheckOutcome, Error> {
             Ok(version) => Good(format!("NATS {version} with JetStream")),
             Err(error) => Trouble(error.to_string()),
         }),
-        _ => Ok(Good("no NATS broker is set".to_owned())),
+        #[cfg(not(feature = "nats"))]
+        Some((url, _)) => Ok(Trouble(format!("{url} is set, but this program was built without NATS"))),
+        None => Ok(Good("no NATS broker is set".to_owned())),
     }
 }

@@ -15,7 +15,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub(super) struct Emg {
+pub(super) struct EmgCommand {
     /// EMG recording: CSV or OpenSim file with a column for each channel (RF_L, TA_L, BF_L, GAS_L, RF_R, BF_R).
     #[arg(value_name = "FILE")]
     recording: PathBuf,
@@ -101,7 +101,7 @@ struct EmgResults {
     activity: Activity,
 }
 
-impl Emg {
+impl EmgCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let settings = self.filters.settings();
         let (recording, strikes) = self.read(&self.recording, (&self.heel_strikes_s, "--heel-strikes-s"))?;

@@ -94,8 +94,8 @@ impl LineageStart {
     /// The gait of an outcome; `lineage` is the one in its file.
     pub(super) fn answer(outcome: SolveOutcome, lineage: Option<Lineage>) -> Self {
         let report = &outcome.report;
-        let figures = (chosen_local_optimum(report), report.objective, report.gait_rmse_rad);
-        let mut start = Self::cold(outcome.warm_start, figures);
+        let values = (chosen_local_optimum(report), report.objective, report.gait_rmse_rad);
+        let mut start = Self::cold(outcome.warm_start, values);
         // Ignore the lineage of a different gait.
         let own = lineage.filter(|lineage| lineage.id == start.gait.id);
         start.before = own.map_or_else(Vec::new, |lineage| lineage.ancestors);

@@ -73,61 +73,61 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Run the service: web pages, REST interface and the studies in a database.
-    Serve(serve::Serve),
+    Serve(serve::ServeCommand),
     /// Run solves on this machine for a service on another machine, through a NATS broker.
-    Worker(worker::Worker),
+    Worker(worker::WorkerCommand),
     /// Run an unattended study in which Gait RMSE, not a person, answers the comparisons.
     ///
     /// If the record has an unfinished study with the same settings, continues it instead of creating another one.
-    Tune(tune::Tune),
+    Tune(tune::TuneCommand),
     /// Reproduce the paper's comparison of gaits with and without muscles.
-    Reproduce(reproduce::Reproduce),
+    Reproduce(reproduce::ReproduceCommand),
     /// Optimise one gait.
-    Solve(solve::Solve),
+    Solve(solve::SolveCommand),
     /// Optimise a gait for each row of a table of actions.
-    Sweep(sweep::Sweep),
+    Sweep(sweep::SweepCommand),
     /// Find the gait of every action of Table I, starting every solve from one root gait.
     ///
-    /// Actions share a gait if the bounds that differ are inactive in it, so that a fraction of the solves is enough.
-    Atlas(atlas::Atlas),
+    /// Actions that differ only in inactive bounds share a gait, so only a fraction of the solves is needed.
+    Atlas(atlas::AtlasCommand),
     /// Certify a gait independently of the optimiser: residuals, closed loop, stability.
-    Certify(certify::Certify),
+    Certify(certify::CertifyCommand),
     /// Simulate walks with a gait on level and uneven ground, under laboratory controllers.
-    Simulate(simulate::Simulate),
+    Simulate(simulate::SimulateCommand),
     /// Convert a gait to a table, an OpenSim motion file or a picture.
-    Convert(convert::Convert),
+    Convert(convert::ConvertCommand),
     /// Compute a reference gait from a recording of joint angles.
-    Reference(reference::Reference),
+    Reference(reference::ReferenceCommand),
     /// Process an EMG recording: envelopes, mean cycles, EMG RMSE, average activity.
-    Emg(emg::Emg),
+    Emg(emg::EmgCommand),
     /// Verify the integrity of a record.
-    Audit(audit::Audit),
+    Audit(audit::AuditCommand),
     /// Show the settings of the service.
-    Config(config::Config),
+    Config(config::ConfigCommand),
     /// Check the machine, the settings and the record. Exits with status 1 if anything is wrong.
     ///
     /// The output is meant for bug reports: it contains no subject data and no secrets.
-    Doctor(doctor::Doctor),
+    Doctor(doctor::DoctorCommand),
     /// Print the description of the REST interface (OpenAPI 3.1).
     Openapi,
     /// Back up a record, even while the service is running.
-    Backup(backup::Backup),
+    Backup(backup::BackupCommand),
     /// Replace a record with a backup, while the service is stopped.
     ///
     /// The replaced record is kept in the same folder under another name.
-    Restore(backup::Restore),
+    Restore(backup::RestoreCommand),
     /// Export a study to an archive, even while the service is running.
-    Export(archive_commands::Export),
+    Export(archive_commands::ExportCommand),
     /// Import a study from an archive, while the service is stopped.
-    Import(archive_commands::Import),
+    Import(archive_commands::ImportCommand),
     /// Create a key for signing archives, and print its public key.
-    SigningKey(archive_commands::NewKey),
+    SigningKey(archive_commands::SigningKeyCommand),
     /// List users or create sign-in links for them, while the service is stopped.
-    Users(users::Users),
+    Users(users::UsersCommand),
     /// Delete old trajectories, while the service is stopped.
     ///
     /// Results, answers and recommended gaits are kept. Expired idempotency keys, sessions and sign-in links are deleted.
-    Prune(prune::Prune),
+    Prune(prune::PruneCommand),
 }
 
 impl Command {

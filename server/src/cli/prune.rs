@@ -10,7 +10,7 @@ use gaitwright_service::studies::pruning::prune;
 use gaitwright_service::studies::retention::{self, DeletedCounts};
 
 #[derive(Debug, Args)]
-pub(super) struct Prune {
+pub(super) struct PruneCommand {
     /// Delete the trajectories of gaits in studies that ended more than this many days ago. Keeps the
     /// trajectories of gaits that are or may be recommended, of the gaits that warm-started them, and of gaits in lab
     /// sessions.
@@ -20,7 +20,7 @@ pub(super) struct Prune {
     pub(super) record: AnchoredFlags,
 }
 
-impl Prune {
+impl PruneCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         exists(&settings.database())?;
         let mut store = settings.open_record().await?;

@@ -12,7 +12,7 @@ use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferen
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub(super) struct Reference {
+pub(super) struct ReferenceCommand {
     /// Recording of joint angles.
     #[arg(value_name = "FILE")]
     recording: PathBuf,
@@ -44,13 +44,13 @@ pub(super) struct Reference {
     height_m: Option<f64>,
     /// Body mass of the measured person, kg.
     #[arg(long, value_name = "KILOGRAMS", value_parser = number, allow_negative_numbers = true)]
-    mass_kg: Option<f64>,
+    body_mass_kg: Option<f64>,
     /// JSON output file (default: standard output).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-impl Reference {
+impl ReferenceCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let new = NewReferenceGait {
             name: self.name,
@@ -62,14 +62,14 @@ impl Reference {
             strikes: self.strikes,
             heel_strikes_s: self.heel_strikes_s,
             height_m: self.height_m,
-            body_mass_kg: self.mass_kg,
+            body_mass_kg: self.body_mass_kg,
         };
         let forces = self.forces.as_ref().map_or_else(String::new, |path| path.display().to_string());
         let flags = [
             ("name", "--name"),
             ("heel_strikes_s", "--heel-strikes-s"),
             ("height_m", "--height-m"),
-            ("body_mass_kg", "--mass-kg"),
+            ("body_mass_kg", "--body-mass-kg"),
         ];
         let reference = new.definition(&self.recording.display().to_string(), &forces);
         let reference = reference.map_err(|error| of_flags(error, &flags))?;

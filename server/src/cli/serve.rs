@@ -8,7 +8,7 @@ use super::settings::{Flags, Settings};
 use super::tls;
 use axum_server::{Handle, Server};
 use clap::Args;
-use gaitwright_http::access_log::keep_pruning;
+use gaitwright_http::access_log_layer::keep_pruning;
 use gaitwright_http::connections::{LimitedListener, Peer};
 use gaitwright_http::{AccessState, AppState, Hosts, is_loopback_name, router};
 use gaitwright_service::access::user_administration;
@@ -35,7 +35,7 @@ const DRAIN: Duration = Duration::from_secs(20);
 const SILENCE: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Args)]
-pub(super) struct Serve {
+pub(super) struct ServeCommand {
     #[command(flatten)]
     pub(super) flags: Flags,
     /// At startup, print a one-time sign-in link for an administrator. Without this flag, a link is printed only until an
@@ -44,7 +44,7 @@ pub(super) struct Serve {
     sign_in_link: bool,
 }
 
-impl Serve {
+impl ServeCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
         let (listen, sign_in, tls) = (settings.listen()?, settings.sign_in()?, settings.tls()?);
         let proxies = settings.proxies()?;

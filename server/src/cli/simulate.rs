@@ -5,14 +5,14 @@ use super::gait_file::read_gait_file;
 use super::output::data;
 use clap::Args;
 use gait_optimizer::CancelToken;
-use gait_optimizer::execution::{ExecutionOptions, ExecutionReport, WalksOnGround, simulate};
+use gait_optimizer::execution::{ExecutionOptions, ExecutionReport, SimulatedWalksOnGround, simulate};
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicU32;
 
 #[derive(Debug, Args)]
-pub(super) struct Simulate {
+pub(super) struct SimulateCommand {
     /// File written by `solve --out`, or a gait downloaded from the service.
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
@@ -43,7 +43,7 @@ fn ground(text: &str) -> Result<f64, String> {
     }
 }
 
-impl Simulate {
+impl SimulateCommand {
     /// Simulates the walks. Falls are a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let mut options = ExecutionOptions {
@@ -80,9 +80,12 @@ fn for_people(report: &ExecutionReport) -> String {
         .iter()
         .map(|walk| format!("{} at {:.0} mm", strides_in_words(walk.strides), 1000.0 * walk.yield_m))
         .collect();
-    lines.push(format!("  undisturbed walks, by how far the ground yields under body weight: {}", by_yield.join(", ")));
+    lines.push(format!(
+        "  undisturbed simulated walks, by how far the ground yields under body weight: {}",
+        by_yield.join(", ")
+    ));
     let [lightest, heaviest] = report.body_mass_kg;
-    lines.push(format!("  disturbed walks: body mass {lightest:.1} to {heaviest:.1} kg"));
+    lines.push(format!("  disturbed simulated walks: body mass {lightest:.1} to {heaviest:.1} kg"));
     lines.extend(report.grounds.iter().flat_map(ground_for_people));
     lines.push(match report.pushes {
         Some(pushes) => format!(
@@ -101,15 +104,15 @@ fn strides_in_words(strides: u32) -> String {
     format!("{strides} {}", if strides == 1 { "stride" } else { "strides" })
 }
 
-fn ground_for_people(ground: &WalksOnGround) -> [String; 2] {
+fn ground_for_people(ground: &SimulatedWalksOnGround) -> [String; 2] {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let [low, high] = ground.completed_share_interval;
     [
         format!(
-            "  {}: {} of {} walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; falls: {}, halts: {}",
+            "  {}: {} of {} simulated walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; falls: {}, halts: {}",
             ground.ground_in_words(),
             ground.completed,
-            ground.walks,
+            ground.simulated_walks,
             percent(ground.completed_share),
             percent(low),
             percent(high),

@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 const MOST_THREADS: usize = 16;
 
 #[derive(Debug, Args)]
-pub(super) struct Solve {
+pub(super) struct SolveCommand {
     #[command(flatten)]
     flags: ProblemFlags,
     /// Bounds that differ from the loosest values in Table I of the paper, as in a1=20,a5=0.013.
@@ -48,7 +48,7 @@ pub(super) struct Solve {
         long,
         value_name = "FILE",
         conflicts_with_all = [
-            "subject", "height_m", "mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
+            "subject", "height_m", "body_mass_kg", "muscles", "device", "settings", "reference", "mesh", "warm", "tolerance",
             "max_iterations", "time_limit_s", "solver_settings", "bounds", "initial_guesses", "nearest_within"
         ]
     )]
@@ -80,7 +80,7 @@ pub(super) struct Solve {
     sensitivities: bool,
 }
 
-/// The printed figures, with the certificate or the explanation if requested.
+/// The printed result, with the certificate or the explanation if requested.
 #[derive(Debug, Serialize)]
 struct PrintedSolve<'a> {
     #[serde(flatten)]
@@ -104,7 +104,7 @@ struct SolveFile<'a> {
     lineage: &'a Lineage,
 }
 
-impl Solve {
+impl SolveCommand {
     fn input(&self) -> Result<(GaitProblem, SolveOptions, Option<LineageStart>), Error> {
         if let Some(path) = &self.problem {
             let SolveInput { problem, options, warm_start } =
@@ -167,9 +167,9 @@ impl Solve {
         } else {
             None
         };
-        // Print the figures first, so that they are not lost if the file cannot be written.
+        // Print the result first, so that it is not lost if the file cannot be written.
         if self.json {
-            let figures = PrintedSolve {
+            let printed = PrintedSolve {
                 report: &outcome.report,
                 lineage: &lineage,
                 reference_gaits: &comparisons,
@@ -177,7 +177,7 @@ impl Solve {
                 explanation: explanation.as_ref(),
                 sensitivities: sensitivities.as_ref(),
             };
-            data(&serde_json::to_string_pretty(&figures).map_err(|e| Error::Internal(e.to_string()))?)?;
+            data(&serde_json::to_string_pretty(&printed).map_err(|e| Error::Internal(e.to_string()))?)?;
         } else {
             data(&for_people(&outcome, &comparisons, &lineage, start.as_ref(), explanation.as_ref()))?;
             if let Some(certificate) = &certificate {

@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 #[derive(Debug, Args)]
-pub(super) struct Sweep {
+pub(super) struct SweepCommand {
     #[command(flatten)]
     flags: ProblemFlags,
     /// CSV file of actions with the header a1,a2,a3,a4,a5,a6,a7,a8.
@@ -44,7 +44,7 @@ const COLUMNS: [&str; 6] =
 
 type Answer = Result<SolveOutcome, SolveError>;
 
-impl Sweep {
+impl SweepCommand {
     pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let actions = actions(&self.actions)?;
         let problem = self.flags.problem(TunedBounds::default())?;

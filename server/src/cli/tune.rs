@@ -24,7 +24,7 @@ use gaitwright_store::studies::WarmStartFrom;
 use std::sync::Arc;
 
 #[derive(Debug, Args)]
-pub(super) struct Tune {
+pub(super) struct TuneCommand {
     #[command(flatten)]
     body: SubjectFlags,
     /// Whether to solve with muscles.
@@ -52,12 +52,12 @@ pub(super) struct Tune {
     warm_start_from: WarmStartFrom,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
-    /// Print one JSON object at the end instead of a line for each trial.
+    /// Print one JSON object at the end, and the line of each trial to stderr.
     #[arg(long)]
     json: bool,
 }
 
-impl Tune {
+impl TuneCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<CommandEnd, Error> {
         let subject = self.body.subject()?;
         let (device, reference, gait_settings) =
@@ -77,7 +77,7 @@ impl Tune {
             gait_settings: Box::new(gait_settings),
             solve_options,
             muscles: self.muscles.is_on(),
-            trial_budget: self.trials,
+            number_of_trials: self.trials,
             parallel_trials: u32::try_from(workers).unwrap_or(1),
             seed: self.seed,
             repeat_results: Some(self.repeat_results),
@@ -89,8 +89,8 @@ impl Tune {
         let ran = Box::pin(unattended::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;
         let (ran, certification) = ran?;
-        let (snapshot, beliefs) = (ran.snapshot.clone(), Arc::clone(&ran.beliefs));
-        let choose = move |pool: &OnPool| best_trial(&snapshot, &*beliefs.posterior(pool, &snapshot)?);
+        let (snapshot, analyses) = (ran.snapshot.clone(), Arc::clone(&ran.analyses));
+        let choose = move |pool: &OnPool| best_trial(&snapshot, &*analyses.posterior(pool, &snapshot)?);
         let best = store.compute(choose).await?.map_err(Error::Learner)?;
         self.print(&summary::of(&ran.snapshot, best, certification))?;
         if !self.json {

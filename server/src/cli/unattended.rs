@@ -4,7 +4,7 @@ use super::interruption::interrupted;
 use super::output::{data, tell};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::certified_best::{self, BestCertification};
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -36,7 +36,7 @@ pub(super) struct Run {
     /// Whether a person stopped it.
     pub(super) interrupted: bool,
     /// The cached posteriors.
-    pub(super) beliefs: Arc<Beliefs>,
+    pub(super) analyses: Arc<Analyses>,
 }
 
 /// The engineering failures of a study. A trial without a gait is a result, not a failure.
@@ -59,7 +59,7 @@ pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> 
     let study = if let Some(study) = unfinished {
         let done = trial_rows::counts(&mut writer, study.id).await?;
         let ended = done.total - done.open;
-        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.trial_budget));
+        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.number_of_trials));
         study
     } else {
         study_plan::create(&mut writer, &Actor::terminal(), new).await?
@@ -89,7 +89,7 @@ pub(super) async fn run(store: &Store, study: &Study, workers: usize, lines: Lin
     if let Some(ended) = ended {
         ended?;
     }
-    Ok(Run { snapshot, interrupted, beliefs: Arc::clone(scheduler.beliefs()) })
+    Ok(Run { snapshot, interrupted, analyses: Arc::clone(scheduler.analyses()) })
 }
 
 /// Runs a study and certifies its best gaits, unless a person stops it.
@@ -103,7 +103,7 @@ pub(super) async fn run_and_certify(
     let certification = if ran.interrupted {
         BestCertification::default()
     } else {
-        certified(store, &ran.snapshot, &ran.beliefs).await?
+        certified(store, &ran.snapshot, &ran.analyses).await?
     };
     Ok((ran, certification))
 }
@@ -112,15 +112,15 @@ pub(super) async fn run_and_certify(
 pub(super) async fn certified(
     store: &mut Store,
     snapshot: &StudySnapshot,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<BestCertification, Error> {
     tell("certifying the best gait");
-    certified_best::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(beliefs)).await
+    certified_best::certify(store, &Actor::terminal(), snapshot.clone(), Arc::clone(analyses)).await
 }
 
 /// Shows progress until the study ends.
 async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<(), Error> {
-    let bar = ProgressBar::new(u64::from(study.plan.trial_budget));
+    let bar = ProgressBar::new(u64::from(study.plan.number_of_trials));
     let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
     if let Ok(style) = ProgressStyle::with_template(style) {
         bar.set_style(style.progress_chars("=> "));

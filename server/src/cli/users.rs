@@ -10,13 +10,13 @@ use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, StoreError, commit, users};
 
 #[derive(Debug, Args)]
-pub(super) struct Users {
+pub(super) struct UsersCommand {
     #[command(subcommand)]
-    what: UsersCommand,
+    what: UsersSubcommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum UsersCommand {
+enum UsersSubcommand {
     /// List users: name, role, sign-in method, and whether the account is disabled.
     List {
         #[command(flatten)]
@@ -31,10 +31,10 @@ enum UsersCommand {
     },
 }
 
-impl Users {
+impl UsersCommand {
     pub(super) fn record(&self) -> &AnchoredFlags {
         match &self.what {
-            UsersCommand::List { record } | UsersCommand::Link { record, .. } => record,
+            UsersSubcommand::List { record } | UsersSubcommand::Link { record, .. } => record,
         }
     }
 
@@ -43,8 +43,8 @@ impl Users {
         let store = match settings.open_record().await {
             Err(StoreError::InUse { .. }) => {
                 let instead = match self.what {
-                    UsersCommand::List { .. } => "Stop it first, or use the Users and tokens page.",
-                    UsersCommand::Link { .. } => "Stop it first, or restart it with --sign-in-link.",
+                    UsersSubcommand::List { .. } => "Stop it first, or use the Users and tokens page.",
+                    UsersSubcommand::Link { .. } => "Stop it first, or restart it with --sign-in-link.",
                 };
                 return Err(Error::conflict(format!("The service is using this database. {instead}")));
             }
@@ -57,7 +57,7 @@ impl Users {
 
     async fn with(&self, store: &Store) -> Result<(), Error> {
         match &self.what {
-            UsersCommand::List { .. } => {
+            UsersSubcommand::List { .. } => {
                 for user in users::all(&mut *store.read().await?).await? {
                     let operator_administrator = if user.has_password { "password" } else { "one-time link" };
                     let disabled = if user.disabled_at.is_some() { "\tdisabled" } else { "" };
@@ -65,7 +65,7 @@ impl Users {
                 }
                 Ok(())
             }
-            UsersCommand::Link { name, .. } => {
+            UsersSubcommand::Link { name, .. } => {
                 let mut writer = store.write().await?;
                 let missing = || Error::NotFound { what: "user".to_owned(), id: name.clone() };
                 let user = users::by_name(&mut writer, name.trim()).await?.ok_or_else(missing)?;

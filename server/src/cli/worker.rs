@@ -3,6 +3,7 @@
 #[cfg(feature = "nats")]
 use super::cores::cores_or;
 use super::flag_numbers::workers;
+#[cfg(feature = "nats")]
 use super::interruption::interrupted;
 use super::settings::{Flags, Settings};
 use clap::Args;
@@ -16,7 +17,7 @@ use std::sync::Arc;
 use tokio_util::sync::CancellationToken;
 
 #[derive(Debug, Args)]
-pub(super) struct Worker {
+pub(super) struct WorkerCommand {
     /// TOML settings file (default: the file that the environment variable GAITWRIGHT_CONFIG names, or gaitwright.toml
     /// in the current folder if it exists).
     #[arg(long, value_name = "FILE")]
@@ -35,7 +36,7 @@ pub(super) struct Worker {
     name: Option<String>,
 }
 
-impl Worker {
+impl WorkerCommand {
     pub(super) fn flags(&self) -> Flags {
         Flags::of_broker(self.config.clone(), self.nats.clone(), self.nats_queue.clone())
     }

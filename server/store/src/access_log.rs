@@ -167,9 +167,9 @@ async fn whose_is(db: &mut Connection, id: &str) -> StoreResult<(Option<StudyId>
         "select id as study, subject_id as subject from studies where id = coalesce(\
          (select id from studies where id = ?1), (select study_id from trials where id = ?1), \
          (select study_id from lab_sessions where id = ?1), \
-         (select l.study_id from measurement_files r join lab_sessions l on l.id = r.session_id where r.id = ?1), \
+         (select l.study_id from measurement_files r join lab_sessions l on l.id = r.lab_session_id where r.id = ?1), \
          (select study_id from feedback where id = ?1), (select study_id from assessments where id = ?1), \
-         (select study_id from blind_pairs where token = ?1)) \
+         (select study_id from blind_pairs where code = ?1)) \
          union all select null, id from subjects where id = ?1 limit 1",
     )
     .bind(id)

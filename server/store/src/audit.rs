@@ -68,11 +68,11 @@ pub struct AuditRow {
     /// Sequence number.
     pub seq: i64,
     /// Time of the change.
-    pub at: Instant,
+    pub created_at: Instant,
     /// Who made the change.
     pub actor: String,
     /// Kind of change, such as `subject.add` or `study.pause`.
-    pub action: String,
+    pub change: String,
     /// What was changed, such as `study 0190...`.
     pub object: String,
     /// Details of the change, with the reason if there is one.
@@ -87,36 +87,38 @@ pub struct AuditRow {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn append(db: &mut Connection, actor: &Actor, action: &str, object: &str, detail: &Value) -> StoreResult<()> {
+pub async fn append(db: &mut Connection, actor: &Actor, change: &str, object: &str, detail: &Value) -> StoreResult<()> {
     let last = sqlx::query("select hash from audit order by seq desc limit 1").fetch_optional(&mut *db).await?;
     let previous: String = match last {
         Some(row) => row.try_get(0)?,
         None => ORIGIN.to_owned(),
     };
-    let at = now();
-    let hash = hash(&previous, &at.to_string(), actor.as_str(), action, object, detail);
-    sqlx::query("insert into audit (at, actor, action, object, detail, previous, hash) values (?, ?, ?, ?, ?, ?, ?)")
-        .bind(at)
-        .bind(actor.as_str())
-        .bind(action)
-        .bind(object)
-        .bind(json_columns::to_text("audit detail", detail)?)
-        .bind(previous)
-        .bind(hash)
-        .execute(db)
-        .await?;
+    let created_at = now();
+    let hash = hash(&previous, &created_at.to_string(), actor.as_str(), change, object, detail);
+    sqlx::query(
+        "insert into audit (created_at, actor, change, object, detail, previous, hash) values (?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(created_at)
+    .bind(actor.as_str())
+    .bind(change)
+    .bind(object)
+    .bind(json_columns::to_text("audit detail", detail)?)
+    .bind(previous)
+    .bind(hash)
+    .execute(db)
+    .await?;
     Ok(())
 }
 
-/// At most `limit` rows before `before`, newest first: those that contain a text in actor, action, object or detail. The
-/// action is found in its own spelling (`lab_session.plan`) and in that of the page (`lab session: plan`).
+/// At most `limit` rows before `before`, newest first: those that contain a text in actor, change, object or detail. The
+/// change is found in its own spelling (`lab_session.plan`) and in that of the page (`lab session: plan`).
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limit: u32) -> StoreResult<Vec<AuditRow>> {
     let rows = sqlx::query(
         "select * from audit where (?1 is null or seq < ?1)
-             and (?2 = '' or instr(lower(actor || ' ' || action || ' ' || replace(replace(action, '_', ' '), '.', ': ')
+             and (?2 = '' or instr(lower(actor || ' ' || change || ' ' || replace(replace(change, '_', ' '), '.', ': ')
                  || ' ' || object || ' ' || detail), lower(?2)) > 0)
          order by seq desc limit ?3",
     )
@@ -130,7 +132,7 @@ pub async fn page(db: &mut Connection, contains: &str, before: Option<i64>, limi
 
 /// Time of the newest row.
 pub(super) async fn newest(db: &mut Connection) -> StoreResult<Option<Instant>> {
-    Ok(sqlx::query_scalar("select at from audit order by seq desc limit 1").fetch_optional(db).await?)
+    Ok(sqlx::query_scalar("select created_at from audit order by seq desc limit 1").fetch_optional(db).await?)
 }
 
 /// The rows of an object, oldest first.
@@ -178,8 +180,8 @@ pub async fn verify(db: &mut Connection) -> StoreResult<ChainCheck> {
             let seq: i64 = raw.try_get("seq")?;
             // An unreadable row was not written by this program.
             let Ok(row) = from_row(raw) else { return Ok(ChainCheck::Broken { seq }) };
-            let at: String = raw.try_get("at")?;
-            let expected = hash(&last, &at, &row.actor, &row.action, &row.object, &row.detail);
+            let created_at: String = raw.try_get("created_at")?;
+            let expected = hash(&last, &created_at, &row.actor, &row.change, &row.object, &row.detail);
             // Rows are never deleted, so the numbers have no gaps.
             if seq != after + 1 || row.previous != last || row.hash != expected {
                 return Ok(ChainCheck::Broken { seq });
@@ -201,18 +203,24 @@ pub(super) async fn last_ever(db: &mut Connection, table: &str) -> StoreResult<i
 }
 
 /// The hash of a row and the previous one, over a JSON object with sorted keys.
-fn hash(previous: &str, at: &str, actor: &str, action: &str, object: &str, detail: &Value) -> String {
-    let whole =
-        json!({"action": action, "actor": actor, "at": at, "detail": detail, "object": object, "previous": previous});
+fn hash(previous: &str, created_at: &str, actor: &str, change: &str, object: &str, detail: &Value) -> String {
+    let whole = json!({
+        "actor": actor,
+        "change": change,
+        "created_at": created_at,
+        "detail": detail,
+        "object": object,
+        "previous": previous,
+    });
     json_columns::sha256(whole.to_string().as_bytes())
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<AuditRow> {
     Ok(AuditRow {
         seq: row.try_get("seq")?,
-        at: row.try_get("at")?,
+        created_at: row.try_get("created_at")?,
         actor: row.try_get("actor")?,
-        action: row.try_get("action")?,
+        change: row.try_get("change")?,
         object: row.try_get("object")?,
         detail: json_columns::column(row, "detail")?,
         previous: row.try_get("previous")?,

@@ -85,7 +85,7 @@ impl OrderedAnswer {
             Self::Second | Self::UnsafeFirst => {
                 Some(feedback::FeedbackContent::Preference { winner: second, loser: first })
             }
-            Self::NoDifference => Some(feedback::FeedbackContent::Tie { a: first, b: second }),
+            Self::NoDifference => Some(feedback::FeedbackContent::NoDifference { a: first, b: second }),
             Self::CannotTell | Self::UnsafeBoth | Self::Retracted => None,
         }
     }
@@ -172,7 +172,7 @@ pub struct BlindPair {
     /// Identifier.
     pub id: BlindPairId,
     /// Token by which the rater knows the pair.
-    pub token: String,
+    pub code: String,
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
@@ -215,7 +215,7 @@ impl BlindPair {
 #[derive(Debug, Clone)]
 pub struct NewBlindPair {
     /// Token by which the rater knows the pair.
-    pub token: String,
+    pub code: String,
     /// Identifier of the study.
     pub study_id: StudyId,
     /// Name of the rater.
@@ -239,11 +239,11 @@ pub struct NewBlindPair {
 pub async fn insert(db: &mut Connection, new: &NewBlindPair) -> StoreResult<BlindPairId> {
     let id = BlindPairId::fresh();
     sqlx::query(
-        "insert into blind_pairs (id, token, study_id, rater, number, kind, trial_a, trial_b, repeats, \
+        "insert into blind_pairs (id, code, study_id, rater, number, kind, trial_a, trial_b, repeats, \
          unblinded, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
-    .bind(&new.token)
+    .bind(&new.code)
     .bind(new.study_id)
     .bind(&new.rater)
     .bind(new.number)
@@ -367,7 +367,7 @@ pub async fn assessments_of_study(db: &mut Connection, study: StudyId) -> StoreR
 /// # Errors
 /// Errors of the database.
 pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &str, reason: &str) -> StoreResult<()> {
-    sqlx::query("insert into unblindings (study_id, rater, actor, reason, created_at) values (?, ?, ?, ?, ?)")
+    sqlx::query("insert into rater_unblindings (study_id, rater, actor, reason, created_at) values (?, ?, ?, ?, ?)")
         .bind(study)
         .bind(rater)
         .bind(actor)
@@ -383,7 +383,7 @@ pub async fn unblind(db: &mut Connection, study: StudyId, rater: &str, actor: &s
 /// # Errors
 /// Errors of the database.
 pub async fn is_unblinded(db: &mut Connection, study: StudyId, rater: &str) -> StoreResult<bool> {
-    let row = sqlx::query("select 1 from unblindings where study_id = ? and rater = ? limit 1")
+    let row = sqlx::query("select 1 from rater_unblindings where study_id = ? and rater = ? limit 1")
         .bind(study)
         .bind(rater)
         .fetch_optional(db)
@@ -395,7 +395,7 @@ impl BlindPair {
     pub(super) fn from_row(row: &SqliteRow) -> StoreResult<Self> {
         Ok(Self {
             id: row.try_get("id")?,
-            token: row.try_get("token")?,
+            code: row.try_get("code")?,
             study_id: row.try_get("study_id")?,
             rater: row.try_get("rater")?,
             number: row.try_get("number")?,

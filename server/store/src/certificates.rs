@@ -59,14 +59,14 @@ pub async fn insert(db: &mut Connection, trial: TrialId, certificate: &Certifica
 /// Errors of the database.
 pub async fn requested(db: &mut Connection) -> StoreResult<Vec<TrialId>> {
     let sql = "select distinct t.id from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) \
-               where a.action = ?1 and t.state = 'converged' \
+               where a.change = ?1 and t.state = 'converged' \
                and not exists (select 1 from certificates c where c.trial_id = t.id and c.format_version = ?2) \
                order by t.id";
     Ok(sqlx::query_scalar(sql).bind(REQUESTED).bind(certificate::FORMAT_VERSION).fetch_all(db).await?)
 }
 
-/// The action in the audit trail that requests a certificate.
-pub const REQUESTED: &str = "trial.ask_certificate";
+/// The change in the audit trail that requests a certificate.
+pub const REQUESTED: &str = "trial.request_certificate";
 
 /// State of the certificate of a converged gait.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

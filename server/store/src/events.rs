@@ -13,7 +13,7 @@ pub struct Event {
     pub study_id: StudyId,
     /// Kind of the event: `study_changed`, `trial_queued`, `trial_started`, `trial_ended`, `feedback_given`,
     /// `feedback_retracted`, `lab_session_answered`, `reported_unsafe`, `safety_reviewed`, `gait_certified`, `trial_explained`,
-    /// `trial_not_explained`, `gait_simulated`.
+    /// `trial_not_explained`, `execution_reported`.
     pub kind: String,
     /// Details.
     pub payload: serde_json::Value,

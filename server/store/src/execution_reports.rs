@@ -9,21 +9,21 @@ use serde::{Deserialize, Serialize};
 use sqlx::Row;
 
 /// Kind of the event with a report.
-pub const SIMULATED: &str = "gait_simulated";
-/// The action in the audit trail that requests a report.
-pub const REQUESTED: &str = "trial.ask_execution_report";
-/// The action in the audit trail that stores a report.
-pub const STORED: &str = "trial.simulate";
+pub const REPORTED: &str = "execution_reported";
+/// The change in the audit trail that requests a report.
+pub const REQUESTED: &str = "trial.request_execution_report";
+/// The change in the audit trail that stores a report.
+pub const STORED: &str = "trial.report_execution";
 
 /// Payload of the event with a report.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GaitSimulated {
+pub struct ExecutionReported {
     /// Identifier of the trial.
     pub trial_id: TrialId,
     /// Its number.
     pub number: u32,
     /// Number of simulated walks on each ground.
-    pub walks: u32,
+    pub simulated_walks: u32,
     /// Seed of the disturbances.
     pub seed: u64,
     /// Version of the program that made the report.
@@ -36,7 +36,7 @@ pub struct GaitSimulated {
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredReport {
     /// The payload of its event.
-    pub simulated: GaitSimulated,
+    pub reported: ExecutionReported,
     /// Time of the event.
     pub created_at: Instant,
 }
@@ -52,12 +52,12 @@ pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<S
          and json_extract(e.payload, '$.report.format_version') = ?3 order by e.seq desc limit 1",
     )
     .bind(trial)
-    .bind(SIMULATED)
+    .bind(REPORTED)
     .bind(execution::FORMAT_VERSION)
     .fetch_optional(db)
     .await?;
     row.map(|row| {
-        Ok(StoredReport { simulated: json_columns::column(&row, "payload")?, created_at: row.try_get("created_at")? })
+        Ok(StoredReport { reported: json_columns::column(&row, "payload")?, created_at: row.try_get("created_at")? })
     })
     .transpose()
 }
@@ -69,9 +69,9 @@ pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<S
 /// Errors of the database.
 pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u64)>> {
     let rows = sqlx::query(
-        "select t.id, json_extract(a.detail, '$.walks') as walks, json_extract(a.detail, '$.seed') as seed \
-         from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) where a.action = ?1 \
-         and not exists (select 1 from audit c where c.seq > a.seq and c.object = a.object and c.action in (?1, ?2)) \
+        "select t.id, json_extract(a.detail, '$.simulated_walks') as simulated_walks, json_extract(a.detail, '$.seed') as seed \
+         from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) where a.change = ?1 \
+         and not exists (select 1 from audit c where c.seq > a.seq and c.object = a.object and c.change in (?1, ?2)) \
          order by a.seq",
     )
     .bind(REQUESTED)
@@ -82,7 +82,7 @@ pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u6
         .map(|row| {
             // Seeds of requests are at most 2^53.
             let seed: i64 = row.try_get("seed")?;
-            Ok((row.try_get("id")?, row.try_get("walks")?, seed.cast_unsigned()))
+            Ok((row.try_get("id")?, row.try_get("simulated_walks")?, seed.cast_unsigned()))
         })
         .collect()
 }

@@ -8,8 +8,8 @@ use gait_optimizer::explanation::Explanation;
 use sqlx::Row;
 use std::collections::BTreeSet;
 
-/// The action in the audit trail that requests an explanation.
-pub const REQUESTED: &str = "trial.ask_explanation";
+/// The change in the audit trail that requests an explanation.
+pub const REQUESTED: &str = "trial.request_explanation";
 
 /// A stored explanation.
 #[derive(Debug, Clone, PartialEq)]

@@ -35,8 +35,8 @@ pub async fn insert(
     (answer, note): (OrderedAnswer, &str),
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into lab_answers (session_id, number, answer, note, actor, created_at) values (?, ?, ?, ?, ?, ?) \
-         on conflict (session_id, number) do nothing",
+        "insert into lab_answers (lab_session_id, number, answer, note, actor, created_at) values (?, ?, ?, ?, ?, ?) \
+         on conflict (lab_session_id, number) do nothing",
     )
     .bind(id)
     .bind(number)
@@ -55,8 +55,8 @@ pub async fn insert(
 /// A violated constraint if there is no such answer; errors of the database.
 pub async fn retract(db: &mut Connection, actor: &Actor, id: LabSessionId, number: u32) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into lab_answer_retractions (session_id, number, actor, created_at) values (?, ?, ?, ?) \
-         on conflict (session_id, number) do nothing",
+        "insert into lab_answer_retractions (lab_session_id, number, actor, created_at) values (?, ?, ?, ?) \
+         on conflict (lab_session_id, number) do nothing",
     )
     .bind(id)
     .bind(number)
@@ -74,8 +74,8 @@ pub async fn retract(db: &mut Connection, actor: &Actor, id: LabSessionId, numbe
 pub async fn of_session(db: &mut Connection, id: LabSessionId) -> StoreResult<Vec<LabAnswer>> {
     let rows = sqlx::query(
         "select a.*, r.number is not null as retracted from lab_answers a \
-         left join lab_answer_retractions r on r.session_id = a.session_id and r.number = a.number \
-         where a.session_id = ? order by a.number",
+         left join lab_answer_retractions r on r.lab_session_id = a.lab_session_id and r.number = a.number \
+         where a.lab_session_id = ? order by a.number",
     )
     .bind(id)
     .fetch_all(db)

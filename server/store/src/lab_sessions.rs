@@ -151,8 +151,8 @@ pub async fn add_step(
     note: &str,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into lab_session_steps (session_id, step, note, actor, created_at) values (?, ?, ?, ?, ?) \
-         on conflict (session_id, step) do nothing",
+        "insert into lab_session_steps (lab_session_id, step, note, actor, created_at) values (?, ?, ?, ?, ?) \
+         on conflict (lab_session_id, step) do nothing",
     )
     .bind(id)
     .bind(step.as_str())
@@ -194,7 +194,7 @@ pub async fn open_since(db: &mut Connection, reach: Reach, limit: u32, since: In
     let rows = sqlx::query(concat!(
         "select l.* from lab_sessions l join studies s on s.id = l.study_id \
          where s.subject_id not in (select subject_id from withdrawn_subjects) \
-         and not exists (select 1 from lab_session_steps a where a.session_id = l.id and a.step = 'closed' \
+         and not exists (select 1 from lab_session_steps a where a.lab_session_id = l.id and a.step = 'closed' \
          and a.created_at < ?5) and ",
         reached!("s.id"),
         " order by l.id desc limit ?4"
@@ -219,7 +219,7 @@ async fn all(db: &mut Connection, rows: &[SqliteRow]) -> StoreResult<Vec<LabSess
 
 async fn whole(db: &mut Connection, row: &SqliteRow) -> StoreResult<LabSession> {
     let id: LabSessionId = row.try_get("id")?;
-    let steps = sqlx::query("select * from lab_session_steps where session_id = ? order by rowid").bind(id);
+    let steps = sqlx::query("select * from lab_session_steps where lab_session_id = ? order by rowid").bind(id);
     let steps = steps.fetch_all(&mut *db).await?;
     let step = |row: &SqliteRow| -> StoreResult<(SessionStep, LabSessionStep)> {
         let done =

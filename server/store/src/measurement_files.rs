@@ -13,14 +13,14 @@ use sqlx::{AssertSqlSafe, Row};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
+/// Kind of measurement file: `emg`, an EMG recording; `joint_angles`, joint angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeasurementKind {
     /// EMG recording.
     Emg,
     /// Joint angles.
-    Motion,
+    JointAngles,
 }
 
 impl MeasurementKind {
@@ -28,7 +28,7 @@ impl MeasurementKind {
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Emg => "emg",
-            Self::Motion => "motion",
+            Self::JointAngles => "joint_angles",
         }
     }
 }
@@ -36,7 +36,7 @@ impl MeasurementKind {
 impl FromStr for MeasurementKind {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Emg, Self::Motion]
+        [Self::Emg, Self::JointAngles]
             .into_iter()
             .find(|kind| kind.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("kind of a measurement file", text))
@@ -49,7 +49,7 @@ pub struct MeasurementFile {
     /// Identifier.
     pub id: MeasurementFileId,
     /// Identifier of the lab session.
-    pub session_id: LabSessionId,
+    pub lab_session_id: LabSessionId,
     /// Number of the walk, 1 to 3.
     pub walk: u8,
     /// Kind of measurement.
@@ -117,7 +117,7 @@ pub async fn insert(
 ) -> StoreResult<MeasurementFile> {
     let added = MeasurementFile {
         id: MeasurementFileId::fresh(),
-        session_id: session,
+        lab_session_id: session,
         walk,
         kind: packed.kind,
         file_name: packed.file_name()?,
@@ -126,7 +126,7 @@ pub async fn insert(
         created_at: now(),
     };
     sqlx::query(
-        "insert into measurement_files (id, session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
+        "insert into measurement_files (id, lab_session_id, walk, kind, reading, raw, raw_sha256, actor, created_at) \
          values (?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(added.id)
@@ -144,7 +144,7 @@ pub async fn insert(
 }
 
 /// Selects files without their content.
-const SELECT: &str = "select id, session_id, walk, kind, json_extract(reading, '$.file_name') as file_name, raw_sha256, actor, created_at from measurement_files";
+const SELECT: &str = "select id, lab_session_id, walk, kind, json_extract(reading, '$.file_name') as file_name, raw_sha256, actor, created_at from measurement_files";
 
 /// The file with this identifier, without its content.
 ///
@@ -161,7 +161,7 @@ pub async fn get(db: &mut Connection, id: MeasurementFileId) -> StoreResult<Meas
 /// # Errors
 /// Errors of the database.
 pub async fn of_session(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<MeasurementFile>> {
-    let sql = AssertSqlSafe(format!("{SELECT} where session_id = ? order by id"));
+    let sql = AssertSqlSafe(format!("{SELECT} where lab_session_id = ? order by id"));
     sqlx::query(sql).bind(session).fetch_all(db).await?.iter().map(from_row).collect()
 }
 
@@ -194,7 +194,7 @@ pub async fn insert_result<T: Serialize>(
     document: &T,
 ) -> StoreResult<EmgResultId> {
     let id = EmgResultId::fresh();
-    sqlx::query("insert into emg_results (id, session_id, document, actor, created_at) values (?, ?, ?, ?, ?)")
+    sqlx::query("insert into emg_results (id, lab_session_id, document, actor, created_at) values (?, ?, ?, ?, ?)")
         .bind(id)
         .bind(session)
         .bind(json_columns::to_text("EMG result", document)?)
@@ -210,7 +210,7 @@ pub async fn insert_result<T: Serialize>(
 /// # Errors
 /// Errors of the database.
 pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Option<T>> {
-    let row = sqlx::query("select document from emg_results where session_id = ? order by id desc limit 1")
+    let row = sqlx::query("select document from emg_results where lab_session_id = ? order by id desc limit 1")
         .bind(session)
         .fetch_optional(db)
         .await?;
@@ -222,14 +222,14 @@ pub async fn newest_result<T: DeserializeOwned>(db: &mut Connection, session: La
 /// # Errors
 /// Errors of the database.
 pub async fn results<T: DeserializeOwned>(db: &mut Connection, session: LabSessionId) -> StoreResult<Vec<T>> {
-    let rows = sqlx::query("select document from emg_results where session_id = ? order by id").bind(session);
+    let rows = sqlx::query("select document from emg_results where lab_session_id = ? order by id").bind(session);
     rows.fetch_all(db).await?.iter().map(|row| json_columns::column(row, "document")).collect()
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<MeasurementFile> {
     Ok(MeasurementFile {
         id: row.try_get("id")?,
-        session_id: row.try_get("session_id")?,
+        lab_session_id: row.try_get("lab_session_id")?,
         walk: row.try_get("walk")?,
         kind: row.try_get::<&str, _>("kind")?.parse()?,
         file_name: row.try_get("file_name")?,

@@ -1,8 +1,8 @@
 //! The quarantine: a temporary record into which an archive is unpacked and checked. It has the constraints, triggers
 //! and foreign keys of the real schema, and contains no other study.
 
-use super::archive::Unpacking;
 use super::archived_row::{Cell, Row};
+use super::archived_rows::Unpacking;
 use super::{Connection, StoreResult, schema_versions};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions, SqliteConnection};

@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
+/// Decision of a safety review: `cleared`, the gait may be used for walking; `unsafe`, it remains marked as unsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SafetyDecision {
@@ -161,11 +161,11 @@ pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<SafetyV
                 (select count(*) from assessments where study_id in own),
                 (select count(*) from assessment_retractions r join assessments m on m.id = r.assessment_id
                  where m.study_id in own),
-                (select count(*) from lab_answers a join lab_sessions s on s.id = a.session_id
+                (select count(*) from lab_answers a join lab_sessions s on s.id = a.lab_session_id
                  where s.study_id in own),
-                (select count(*) from lab_answer_retractions r join lab_sessions s on s.id = r.session_id
+                (select count(*) from lab_answer_retractions r join lab_sessions s on s.id = r.lab_session_id
                  where s.study_id in own),
-                (select count(*) from lab_session_steps a join lab_sessions s on s.id = a.session_id
+                (select count(*) from lab_session_steps a join lab_sessions s on s.id = a.lab_session_id
                  where s.study_id in own and a.step = 'unblinded'),
                 (select count(*) from safety_reviews r cross join trials t on t.id = r.trial_id
                  where t.study_id in own),

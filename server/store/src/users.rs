@@ -101,7 +101,7 @@ pub async fn set_role(db: &mut Connection, id: UserId, role: Role) -> StoreResul
 /// # Errors
 /// Errors of the database.
 pub async fn former_roles(db: &mut Connection, id: UserId) -> StoreResult<Vec<Role>> {
-    let sql = "select json_extract(detail, '$.before') from audit where action = 'user.role' and object = ?";
+    let sql = "select json_extract(detail, '$.before') from audit where change = 'user.role' and object = ?";
     let words: Vec<String> = sqlx::query_scalar(sql).bind(format!("user {id}")).fetch_all(db).await?;
     words.iter().map(|word| word.parse()).collect()
 }

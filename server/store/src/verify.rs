@@ -69,7 +69,7 @@ pub(super) async fn rows(db: &mut Connection, version: i64) -> StoreResult<(Chai
     let seals = match seals::verify(db).await? {
         seals::SealCheck::Intact { seals, last } => (seals, last),
         seals::SealCheck::Broken { seq } => {
-            return Err(damaged("seals", format!("the seals are broken at number {seq}")));
+            return Err(damaged("seals", format!("the chain of seals is broken at seal {seq}")));
         }
         seals::SealCheck::Unsealed { table, key } => return Err(StoreError::Unsealed { table, key }),
         seals::SealCheck::Touched { table, key } => return Err(seals::touched(&table, &key)),

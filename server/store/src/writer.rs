@@ -259,7 +259,7 @@ impl Shared {
         let Ok(frames) = log_frames(connection).await else { return };
         if vanished && self.outside.files.as_ref().is_some_and(|files| files.log_is_to_be_saved(frames)) {
             fold(connection).await;
-            tracing::warn!("the content of the write-ahead log was saved to the database file");
+            tracing::warn!("the write-ahead log was checkpointed");
         }
     }
 
@@ -306,7 +306,7 @@ async fn supervise_flushing(line: LentConnection, shared: Arc<Shared>) {
         let flushing = keep_flushing(Arc::clone(&line), Arc::clone(&shared));
         match AbortOnDropHandle::new(tokio::spawn(flushing)).await {
             Ok(()) => return,
-            Err(error) => tracing::error!(%error, "committing changes failed; restarting"),
+            Err(error) => tracing::error!(%error, "the commit task panicked; restarting it"),
         }
         shared.ended.notify_one();
         tokio::time::sleep(PAUSE).await;
@@ -338,7 +338,7 @@ async fn log_frames(connection: &mut SqliteConnection) -> StoreResult<u32> {
 /// Merges the log into the database file.
 async fn fold(connection: &mut SqliteConnection) {
     if let Err(error) = run(connection, "pragma wal_checkpoint(passive)").await {
-        tracing::error!(%error, "cannot save the write-ahead log to the database file");
+        tracing::error!(%error, "cannot checkpoint the write-ahead log");
     }
 }
 

@@ -39,17 +39,17 @@ fn lengthen(gait: &mut Value) {
     gait["speed_m_s"] = (gait["stride_length_m"].as_f64().unwrap() / stride).into();
 }
 
-/// Writes the figures of a gait into the reports of the first converged trial.
+/// Writes the results of a gait into the reports of the first converged trial.
 fn state_figures_of(rows: &mut Rows, gait: &Value) {
     let gait: Gait = serde_json::from_value(gait.clone()).unwrap();
     let reference = serde_json::from_str(rows.first("reference_gaits")["definition"].as_str().unwrap()).unwrap();
-    let figures = GaitResults::of(&gait, &reference).unwrap();
-    everywhere(rows, "gait_rmse_rad", figures.gait_rmse_rad);
-    everywhere(rows, "cost_of_transport", figures.cost_of_transport);
+    let results = GaitResults::of(&gait, &reference).unwrap();
+    everywhere(rows, "gait_rmse_rad", results.gait_rmse_rad);
+    everywhere(rows, "cost_of_transport", results.cost_of_transport);
     in_reports(rows, |report| {
-        report["gait_rmse_parts_rad"] = json!(figures.gait_rmse_parts_rad);
-        report["speed_m_s"] = json!(figures.speed_m_s);
-        report["durations_s"] = json!(figures.durations_s);
+        report["gait_rmse_parts_rad"] = json!(results.gait_rmse_parts_rad);
+        report["speed_m_s"] = json!(results.speed_m_s);
+        report["durations_s"] = json!(results.durations_s);
     });
 }
 
@@ -234,7 +234,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
         |r| r.first("trials")["state"] = "not_converged".into(),
         "contradicts the state",
     ),
-    ("a failed trial with figures", |r| r.first("trials")["state"] = "failed".into(), "has a solve report"),
+    ("a failed trial with results", |r| r.first("trials")["state"] = "failed".into(), "has a solve report"),
     (
         "a best trial from nowhere",
         |r| r.first("trials")["best_before"] = "01900000-0000-7000-8000-000000000001".into(),
@@ -276,8 +276,8 @@ pub(super) const FORGERIES: [Forgery; 69] = [
         "the preference contradicts Gait RMSE",
     ),
     (
-        "a tie of Gait RMSE",
-        |r| of_source(r, "gait_rmse")["kind"] = "tie".into(),
+        "no difference by Gait RMSE",
+        |r| of_source(r, "gait_rmse")["kind"] = "no_difference".into(),
         "the preference contradicts Gait RMSE",
     ),
     (
@@ -333,7 +333,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
         },
         "not in the search space",
     ),
-    ("a retraction of nothing", |r| r.first("retractions")["feedback_seq"] = 99_999.into(), "FOREIGN KEY"),
+    ("a retraction of nothing", |r| r.first("feedback_retractions")["feedback_seq"] = 99_999.into(), "FOREIGN KEY"),
     (
         "an author that reads backwards",
         |r| of_source(r, "clinician")["author"] = "a\u{202e}b".into(),

@@ -10,7 +10,7 @@ mod rows;
 use axum::http::StatusCode;
 use forgeries::{FORGERIES, MORE, of_source};
 use gaitwright_service::studies::archive::{self, SigningKey};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::{Store, StudyId, now};
 use gaitwright_tests::archives::{exported, import, import_trusting};
 use gaitwright_tests::cli;
@@ -24,7 +24,7 @@ use tempfile::TempDir;
 async fn study() -> (TempDir, Service, StudyId, Vec<u8>) {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Consistent::default(), 1).await;
-    let study = service.study(|new| (new.trial_budget, new.feedback_mode) = (8, FeedbackMode::Mixed)).await;
+    let study = service.study(|new| (new.number_of_trials, new.answer_source) = (8, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let good: Vec<_> = trials.iter().filter(|t| t.state.as_str() == "converged").map(|t| t.id).collect();

@@ -4,15 +4,16 @@ use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::StudyId;
 use gaitwright_store::feedback::FeedbackRow;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use std::time::Duration;
 
 /// Where the page has what an answer needs.
-const NEEDED: &str = "h1, details.person summary, .motions svg.gait-figure, .motions .answer, .extras summary";
+const NEEDED: &str = "h1, details.person summary, .motions svg.gait-walker, .motions .answer, .extras summary";
 
 async fn waiting(site: &Site, trials: u32) -> StudyId {
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (trials, FeedbackMode::Human)).await;
+    let study =
+        site.service.study(|new| (new.number_of_trials, new.answer_source) = (trials, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }
@@ -95,7 +96,7 @@ async fn browser_staff_see_both_gaits_and_every_answer_without_scrolling() {
             page.resize(width, height).await;
             let (bottom, ..) = page.lowest(NEEDED).await;
             assert!(bottom <= height as f64, "{width} x {height}: {bottom}");
-            let (_, wide, high) = page.lowest(".motions svg.gait-figure").await;
+            let (_, wide, high) = page.lowest(".motions svg.gait-walker").await;
             assert!(high >= least && wide >= 300.0, "{width} x {height}: {wide} x {high}");
             assert_eq!(page.beyond().await, "0");
             if answered {

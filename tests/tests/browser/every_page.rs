@@ -6,12 +6,12 @@ use crate::site::Site;
 use axum::http::StatusCode;
 use gait_learner::{Dimension, SearchSpace};
 use gait_optimizer::SolveStatus;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId, commit, explanations};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{explanation, without_gaits};
-use gaitwright_tests::measured::{electromyogram, motion};
+use gaitwright_tests::measured::{electromyogram, joint_angles};
 use gaitwright_tests::simulated;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -36,7 +36,7 @@ async fn people(site: &Site) {
 
 /// A study that a script evaluates, and its trial that has results but no gait.
 async fn by_script(site: &Site) -> (StudyId, String) {
-    let study = site.service.study(|new| (new.evaluation, new.trial_budget) = (Evaluation::Script, 3)).await;
+    let study = site.service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 3)).await;
     let ask = async || site.service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
     let trial = ask().await["id"].as_str().unwrap().to_owned();
     let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
@@ -51,7 +51,7 @@ async fn study_without_gaits(site: &Site) -> StudyId {
     let study = site
         .service
         .study(|new| {
-            (new.base_bounds.a5, new.base_bounds.a6, new.trial_budget) = (0.039, 0.0, 2);
+            (new.base_bounds.a5, new.base_bounds.a6, new.number_of_trials) = (0.039, 0.0, 2);
             let velocity = Dimension { name: "a1".to_owned(), values: vec![15.0, 20.0], lengthscale: 5.0 };
             new.search_space = Some(SearchSpace::new(vec![velocity]).unwrap().into());
         })
@@ -64,7 +64,7 @@ async fn study_without_gaits(site: &Site) -> StudyId {
 async fn withdrawn(site: &Site) -> (String, StudyId) {
     let described = json!({"pseudonym": "S09", "height_m": 1.7, "body_mass_kg": 66});
     let subject = site.service.post("/api/v1/subjects", &described).await.json()["id"].as_str().unwrap().to_owned();
-    let study = site.service.study(|new| (new.subject_id, new.trial_budget) = (subject.parse().unwrap(), 2)).await;
+    let study = site.service.study(|new| (new.subject_id, new.number_of_trials) = (subject.parse().unwrap(), 2)).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     site.service.post(&format!("/api/v1/subjects/{subject}/withdraw"), &json!({"reason": "moved away"})).await;
     (subject, study)
@@ -72,10 +72,10 @@ async fn withdrawn(site: &Site) -> (String, StudyId) {
 
 /// Every page, with content: name and address.
 async fn pages(site: &Site) -> Vec<(&'static str, String)> {
-    let study = site.service.study(|new| (new.trial_budget, new.name) = (24, Some(LONG_WORD.to_owned()))).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.name) = (24, Some(LONG_WORD.to_owned()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let human = (4, FeedbackMode::Human, Some(LONG_NAME.to_owned()));
-    let other = site.service.study(|new| (new.trial_budget, new.feedback_mode, new.name) = human).await;
+    let human = (4, AnswerSource::People, Some(LONG_NAME.to_owned()));
+    let other = site.service.study(|new| (new.number_of_trials, new.answer_source, new.name) = human).await;
     site.service.wait_for(other, &[StudyState::Waiting]).await;
     let trials = site.service.trials(study).await;
     let of = |state| trials.iter().find(|trial| trial.state == state).map(|trial| trial.id);
@@ -95,8 +95,8 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         let emg = json!({"walk": walk, "recording": emg, "reading": {"heel_strike_column": "heel"}});
         site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/emg"), &emg).await;
     }
-    let joints = json!({"walk": 2, "recording": motion()});
-    site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/motion"), &joints).await;
+    let joints = json!({"walk": 2, "recording": joint_angles()});
+    site.service.post(&format!("/api/v1/lab-sessions/{session}/measurement-files/joint-angles"), &joints).await;
     site.service.post(&format!("/api/v1/lab-sessions/{session}/emg-results"), &json!({})).await;
     // A session that waits for the answer of the subject, and one with an answer.
     let gaits = json!({"trial_a": converged[0].id, "trial_b": converged[1].id});
@@ -157,7 +157,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("reference", format!("/reference-gaits/{}", site.service.reference().await)),
         ("new-study", "/studies/new".to_owned()),
         ("study", format!("/studies/{study}")),
-        ("belief", format!("/studies/{study}/belief?x=a5&y=a6")),
+        ("analysis", format!("/studies/{study}/analysis?x=a5&y=a6")),
         ("side-by-side", format!("/studies/compare?a={study}&b={other}")),
         ("compare", format!("/studies/{other}/compare")),
         ("gait", format!("/trials/{gait}")),
@@ -181,7 +181,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
 /// Trials without a gait: not explained, being explained, and explained.
 async fn trials_without_gaits(site: &Site) -> [TrialId; 3] {
     let study =
-        site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
+        site.service.study(|new| (new.number_of_trials, new.search_space) = (3, Some(without_gaits().into()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trials = site.service.trials(study).await;
     let asked = site.service.post(&format!("/api/v1/trials/{}/explanation", trials[1].id), &json!({})).await;

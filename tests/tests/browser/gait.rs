@@ -11,7 +11,7 @@ use std::time::Duration;
 
 async fn with_a_gait() -> (Site, TrialId) {
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 1).await;
+    let study = site.service.study(|new| new.number_of_trials = 1).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trial = site.service.trials(study).await[0].id;
     (site, trial)
@@ -107,7 +107,7 @@ async fn browser_has_one_cursor_for_walker_and_charts() {
 async fn browser_explains_a_trial_without_a_gait() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 40).await;
+    let study = site.service.study(|new| new.number_of_trials = 40).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trials = site.service.trials(study).await;
     let without = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap();
@@ -126,7 +126,7 @@ async fn browser_shows_an_explanation_when_it_is_ready() {
     let explainer = Clearance::slow(Duration::from_secs(2));
     let site = Site::start_explaining(Analytic::default(), explainer).await;
     let study =
-        site.service.study(|new| (new.trial_budget, new.search_space) = (3, Some(without_gaits().into()))).await;
+        site.service.study(|new| (new.number_of_trials, new.search_space) = (3, Some(without_gaits().into()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let last = site.service.trials(study).await[2].id;
     let page = browser.open(&site.at(&format!("/trials/{last}"))).await;

@@ -11,7 +11,7 @@ use serde_json::json;
 
 /// A study, and a session of it that was planned.
 async fn planned(site: &Site) -> (StudyId, String) {
-    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let study = site.service.study(|new| new.number_of_trials = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let mut gaits = site.service.trials(study).await;
     gaits.retain(|trial| trial.state == TrialState::Converged);

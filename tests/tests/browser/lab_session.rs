@@ -24,7 +24,7 @@ async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
     let axe = Axe::find();
     let axe = axe.as_ref();
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let study = site.service.study(|new| new.number_of_trials = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
 
     // Planned from the page of the study. The allocation is concealed.
@@ -102,7 +102,7 @@ async fn browser_previews_an_emg_recording_and_rejects_a_stride() {
     let Some(browser) = Chromium::launch().await else { return };
     let axe = Axe::find();
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 12).await;
+    let study = site.service.study(|new| new.number_of_trials = 12).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let trials = site.service.trials(study).await;
     let mut gaits = trials.iter().filter(|trial| trial.state == TrialState::Converged);

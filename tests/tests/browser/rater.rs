@@ -4,12 +4,12 @@ use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::StudyId;
 use gaitwright_store::feedback::{FeedbackRow, Source};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 
 /// A study that waits for a comparison.
 async fn waiting(site: &Site) -> StudyId {
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     study
 }
@@ -56,7 +56,7 @@ async fn browser_rater_answers_with_one_click_and_undoes_the_answer() {
 async fn browser_next_pair_comes_by_itself_unless_it_is_turned_off() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (6, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let page = at_the_pair(&browser, &site).await;
     page.click("button[value=second]").await;
@@ -108,7 +108,7 @@ async fn browser_rater_sees_both_gaits_and_every_answer_without_scrolling() {
 async fn browser_rater_gives_five_answers_on_a_phone_with_one_touch_each() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let page = browser.open(&site.at("/rate")).await;
     page.resize(390, 844).await;
@@ -144,7 +144,7 @@ async fn browser_rater_gives_five_answers_on_a_phone_with_one_touch_each() {
 async fn browser_rater_answers_with_one_key() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (8, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (8, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let page = at_the_pair(&browser, &site).await;
     let said = [("ArrowLeft", "the first gait"), ("3", "the second gait"), ("2", "no difference")];

@@ -9,7 +9,7 @@ use gaitwright_service::studies::membership::{self, NewMember};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::commit;
 use gaitwright_store::members::MemberKind;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 
@@ -106,7 +106,7 @@ async fn browser_administrator_adds_a_rater_and_a_token_and_reads_the_audit_trai
 async fn browser_sends_an_answer_after_the_session_ended() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, _) = guarded().await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let mut writer = site.service.store.write().await.unwrap();
     let new = NewUser { name: "R1".to_owned(), role: Role::Rater };

@@ -2,7 +2,7 @@
 
 use crate::chromium::Chromium;
 use crate::site::Site;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::large;
 use gaitwright_tests::users;
@@ -15,8 +15,8 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     let site = Site::start(Analytic::slow(Duration::from_millis(15))).await;
     let page = browser.open(&site.origin).await;
     page.click("a.button").await;
-    page.wait_for("#trial_budget").await;
-    page.fill("#trial_budget", "3").await;
+    page.wait_for("#number_of_trials").await;
+    page.fill("#number_of_trials", "3").await;
     page.click("button[type=submit]").await;
     // The page follows the study by itself.
     page.wait_for(".running[data-trial]").await;
@@ -30,7 +30,7 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     let told = site.service.fetch(&bounds).await.json();
     assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
     page.click("[data-part=best] a.button").await;
-    page.wait_for(".walker svg.gait-figure").await;
+    page.wait_for(".walker svg.gait-walker").await;
     page.wait_for("[data-phase]").await;
     assert!(page.count("svg.chart").await >= 12);
     page.is_clean(&site.origin).await;
@@ -41,7 +41,7 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
 async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_the_fold() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let study = site.service.study(|new| new.number_of_trials = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let best = site.service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await.json();
     let address = site.at(&format!("/studies/{study}"));
@@ -49,7 +49,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.resize(1280, 800).await;
     page.wait_for(".outcome [data-phase]").await;
     assert_eq!(page.value("document.querySelector('.outcome [data-trial]').dataset.trial").await, best["trial_id"]);
-    let (bottom, _, height) = page.lowest(".outcome svg.gait-figure").await;
+    let (bottom, _, height) = page.lowest(".outcome svg.gait-walker").await;
     assert!(bottom <= 800.0 && height >= 300.0, "{bottom} {height}");
     let (bottom, ..) = page.lowest(".outcome [data-part=best] a").await;
     assert!(bottom <= 800.0, "{bottom}");
@@ -58,7 +58,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.wait_until(&format!("{phase} !== {before:?}")).await;
     // The sentence about certainty states what the recommendation says.
     let sure = page.text("[data-part=best]").await;
-    assert!(sure.contains("Its Gait RMSE is computed, not estimated: it is the lowest of"), "{sure}");
+    assert!(sure.contains("The recommended gait has the lowest Gait RMSE of"), "{sure}");
     // Another gait walks once this one is reported as unsafe.
     let report = format!("/api/v1/trials/{}/safety-reports", best["trial_id"].as_str().unwrap());
     assert!(site.service.post(&report, &serde_json::json!({"note": "fell"})).await.status.is_success());
@@ -70,7 +70,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
     page.wait_until(&format!("{phase} !== {before:?}")).await;
     page.is_clean(&site.origin).await;
     let plain = browser.open_without_scripts(&address).await;
-    assert_eq!(plain.count(".outcome svg.gait-figure").await, 1);
+    assert_eq!(plain.count(".outcome svg.gait-walker").await, 1);
     browser.close().await;
 }
 
@@ -78,7 +78,7 @@ async fn browser_shows_the_recommended_gait_of_a_finished_study_walking_above_th
 async fn browser_follows_a_running_solve() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(400))).await;
-    let study = site.service.study(|new| new.trial_budget = 1).await;
+    let study = site.service.study(|new| new.number_of_trials = 1).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.wait_for(".running [data-chart] svg.chart").await;
     let text = "document.querySelector('.running [data-text]')?.textContent ?? ''";
@@ -96,7 +96,7 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     let Some(browser) = Chromium::launch().await else { return };
     // Slow enough for the page to be open before the first result.
     let site = Site::start(Analytic::slow(Duration::from_millis(150))).await;
-    let study = site.service.study(|new| new.trial_budget = 200).await;
+    let study = site.service.study(|new| new.number_of_trials = 200).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.resize(1280, 800).await;
     assert!(
@@ -114,11 +114,11 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     page.wait_until("/^About .+ left for \\d+ trials/m.test(document.querySelector('[data-part=state]').innerText)")
         .await;
     assert_eq!(page.value("window.same ?? false").await, "true");
-    let (bottom, ..) = page.lowest(".outcome svg.gait-figure").await;
+    let (bottom, ..) = page.lowest(".outcome svg.gait-walker").await;
     assert!(bottom <= 800.0, "{bottom}");
     page.is_clean(&site.origin).await;
     let told = async |trials: u32| {
-        let fresh = site.service.study(|new| new.trial_budget = trials).await;
+        let fresh = site.service.study(|new| new.number_of_trials = trials).await;
         site.service.fetch(&format!("/studies/{fresh}")).await.text
     };
     let long = told(8).await;
@@ -133,7 +133,7 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
 async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over_the_answers() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (12, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::People)).await;
     for _ in 0..4 {
         users::answer_once(&site.service, study).await;
     }
@@ -158,7 +158,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
         page.text("[data-part=best]").await.contains("After 4 comparisons, the learner is")
             || page.text("[data-part=best]").await.contains("after 4 comparisons, the learner is only")
     );
-    let analysis = browser.open(&site.at(&format!("/studies/{study}/belief"))).await;
+    let analysis = browser.open(&site.at(&format!("/studies/{study}/analysis"))).await;
     assert!(analysis.text("#best tbody tr:nth-child(2)").await.contains(&sure), "{sure}");
     // A new answer adds a point without a reload.
     users::answer_once(&site.service, study).await;
@@ -171,7 +171,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
 async fn browser_reaches_each_section_of_a_study_from_its_index_with_the_keyboard() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 4).await;
+    let study = site.service.study(|new| new.number_of_trials = 4).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     let order = "[...document.querySelectorAll('nav.index a')].map(a => document.querySelector(a.getAttribute('href')).offsetTop)";
@@ -195,7 +195,7 @@ async fn browser_reaches_each_section_of_a_study_from_its_index_with_the_keyboar
 async fn browser_updates_do_not_overwrite_edited_fields() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let study = site.service.study(|new| new.number_of_trials = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.wait_for("#more").await;
@@ -219,7 +219,7 @@ async fn browser_updates_do_not_overwrite_edited_fields() {
 async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 40).await;
+    let study = site.service.study(|new| new.number_of_trials = 40).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let errors =
         "[...document.querySelectorAll('.trials tbody tr')].map(r => r.cells[2].textContent).filter(t => t !== '–')";
@@ -260,9 +260,9 @@ async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
 async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 8).await;
+    let study = site.service.study(|new| new.number_of_trials = 8).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let page = browser.open(&site.at(&format!("/studies/{study}/belief?x=a5&y=a6"))).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}/analysis?x=a5&y=a6"))).await;
     assert_eq!(page.count("#marginals svg.chart .band").await, 8);
     // Four clearances by six leans, twice.
     assert_eq!(page.count("#maps svg.map .cell").await, 48);
@@ -273,12 +273,12 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     assert!(page.text("#best tr.best").await.contains("recommended"));
     let means = "[...document.querySelectorAll('#best tbody tr')].map(r => Number(r.cells[2].textContent.split(' ')[0].replace('\u{2212}', '-')))";
     assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
-    // Where Gait RMSE answers, it decides, and not the belief beside it.
+    // Where Gait RMSE answers, it decides, and not the analysis beside it.
     let by_rmse = "[...document.querySelectorAll('#best tbody tr')].slice(1).every((row, i, all) => \
         row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
         ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
     assert_eq!(page.value(by_rmse).await, "true");
-    let bars = "[...document.querySelectorAll('#bounds meter')].map(m => m.value)";
+    let bars = "[...document.querySelectorAll('#main-effects meter')].map(m => m.value)";
     assert_eq!(
         page.value(&format!(
             "{bars}.length === 8 && {bars}[0] === 1 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])"
@@ -299,12 +299,12 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let doubted = "[...document.querySelectorAll('#answers tbody td:last-child')].every(cell => parseInt(cell.textContent) <= 50)";
     assert_eq!(page.value(doubted).await, "true");
     page.is_clean(&site.origin).await;
-    let wrong = site.service.fetch(&format!("/studies/{study}/belief?x=a5&y=a5")).await;
+    let wrong = site.service.fetch(&format!("/studies/{study}/analysis?x=a5&y=a5")).await;
     assert!(wrong.status.is_client_error(), "{}", wrong.status);
     page.click("#dot circle").await;
     page.wait_until(&format!("location.pathname === {trial:?}")).await;
 
-    let other = site.service.study(|new| (new.trial_budget, new.muscles) = (4, false)).await;
+    let other = site.service.study(|new| (new.number_of_trials, new.muscles) = (4, false)).await;
     site.service.wait_for(other, &[StudyState::Finished]).await;
     let page = browser.open(&site.at(&format!("/studies/compare?a={study}&b={other}"))).await;
     assert_eq!(page.count("svg.chart path.line").await, 2);
@@ -325,10 +325,10 @@ async fn browser_checks_the_new_study_form_during_input() {
     page.wait_for("[data-reference] figure svg").await;
     let matcher = page.text("[data-reference]").await;
     assert!(matcher.contains("nearer") || matcher.contains("nearest"), "{matcher}");
-    page.fill("#trial_budget", "many").await;
-    page.wait_for("#trial_budget[aria-invalid=true]").await;
+    page.fill("#number_of_trials", "many").await;
+    page.wait_for("#number_of_trials[aria-invalid=true]").await;
     page.wait_for("[data-outlook].bad").await;
-    page.fill("#trial_budget", "2").await;
+    page.fill("#number_of_trials", "2").await;
     // A refused field is shown, even if its section was collapsed.
     page.run("document.querySelector('#seed').value = 'x'").await;
     page.fill("#name", "a seed that is none").await;
@@ -354,7 +354,7 @@ async fn browser_checks_the_new_study_form_during_input() {
 async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
 
     // The home page has the queue.
@@ -362,7 +362,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     page.click("[aria-labelledby=waits] a").await;
     // Both gaits walk, on one clock.
     page.wait_for(".walker [data-play]").await;
-    assert_eq!(page.count(".walker svg.gait-figure").await, 2);
+    assert_eq!(page.count(".walker svg.gait-walker").await, 2);
     let drawn =
         "[...document.querySelectorAll('.walker [data-segment]')].map(part => part.getAttribute('transform')).join()";
     let before = page.value(drawn).await;
@@ -422,7 +422,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
 async fn browser_receives_trial_events_after_a_service_restart() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
-    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let study = site.service.study(|new| new.number_of_trials = 6).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.wait_until("document.querySelectorAll('.trials tbody .converged').length >= 1").await;
     let away = |_| tokio::time::sleep(Duration::from_millis(300));
@@ -440,7 +440,7 @@ async fn browser_receives_trial_events_after_a_service_restart() {
 async fn browser_opens_ten_thousand_trials_within_a_second() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 3).await;
+    let study = site.service.study(|new| new.number_of_trials = 3).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let fill = |database: PathBuf| async move { large::fill(&database, study).await };
     let site = site.restart(Analytic::default(), fill).await;
@@ -467,7 +467,7 @@ async fn browser_opens_ten_thousand_trials_within_a_second() {
 async fn browser_shows_the_values_at_the_pointer() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 6).await;
+    let study = site.service.study(|new| new.number_of_trials = 6).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     let history = site.service.fetch(&format!("/api/v1/studies/{study}/history")).await.items();
@@ -491,7 +491,7 @@ async fn browser_shows_the_values_at_the_pointer() {
 async fn browser_reports_lost_and_restored_connection() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(60))).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     let site = site
@@ -521,7 +521,7 @@ async fn browser_reports_lost_and_restored_connection() {
 async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (3, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (3, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let at = site.at(&format!("/studies/{study}/compare"));
     let page = browser.open(&at).await;
@@ -545,7 +545,7 @@ async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
     assert_eq!(still.count("svg.tiles").await, 2);
     let plain = browser.open_without_scripts(&at).await;
     assert_eq!(plain.count("svg.tiles").await, 2);
-    let seen = "[...document.querySelectorAll('svg.gait-figure, [data-key], [data-keys]')].filter(c => c.getClientRects().length).length";
+    let seen = "[...document.querySelectorAll('svg.gait-walker, [data-key], [data-keys]')].filter(c => c.getClientRects().length).length";
     assert_eq!(plain.value(seen).await, "0", "no empty frames, no keys that do nothing");
     browser.close().await;
 }
@@ -554,7 +554,7 @@ async fn browser_shows_two_gaits_by_time_and_as_still_pictures() {
 async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let study = site.service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let at = site.at(&format!("/studies/{study}/compare"));
     let (one, other) = (browser.open(&at).await, browser.open(&at).await);
@@ -575,7 +575,7 @@ async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
 async fn browser_prints_trials_without_breaking_headings() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.trial_budget = 12).await;
+    let study = site.service.study(|new| new.number_of_trials = 12).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
     page.be_paper().await;

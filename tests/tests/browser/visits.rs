@@ -3,7 +3,7 @@
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::StudyId;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{Clearance, without_gaits};
@@ -54,9 +54,9 @@ fn link(study: StudyId) -> String {
 async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_presses() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
-    let finished = site.service.study(|new| new.trial_budget = 6).await;
+    let finished = site.service.study(|new| new.number_of_trials = 6).await;
     site.service.wait_for(finished, &[StudyState::Finished]).await;
-    let other = site.service.study(|new| new.trial_budget = 4).await;
+    let other = site.service.study(|new| new.number_of_trials = 4).await;
     site.service.wait_for(other, &[StudyState::Finished]).await;
 
     let mut visit = Visit::begin(&browser, &site, "which gait is best, and how sure is that").await;
@@ -95,14 +95,14 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
 async fn browser_reaches_a_running_study_and_its_comparison_in_few_presses() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::slow(Duration::from_millis(300))).await;
-    let running = site.service.study(|new| new.trial_budget = 400).await;
+    let running = site.service.study(|new| new.number_of_trials = 400).await;
     site.service.wait_for(running, &[StudyState::Running]).await;
     let mut visit = Visit::begin(&browser, &site, "how far is a running study").await;
     visit.press(&link(running)).await;
     visit.ends_at("[data-part=state]", "of 400 trials", 1).await;
     site.service.post(&format!("/api/v1/studies/{running}/stop"), &json!({})).await;
 
-    let asking = site.service.study(|new| (new.trial_budget, new.feedback_mode) = (4, FeedbackMode::Human)).await;
+    let asking = site.service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     site.service.wait_for(asking, &[StudyState::Waiting]).await;
     // Who answers is asked once.
     let mut visit = Visit::begin(&browser, &site, "answer the comparison that waits").await;
@@ -119,7 +119,7 @@ async fn browser_reaches_the_conflict_of_a_trial_without_a_gait_in_two_presses()
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start_explaining(Analytic::default(), Clearance::default()).await;
     let study =
-        site.service.study(|new| (new.trial_budget, new.search_space) = (2, Some(without_gaits().into()))).await;
+        site.service.study(|new| (new.number_of_trials, new.search_space) = (2, Some(without_gaits().into()))).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let mut visit = Visit::begin(&browser, &site, "why is there no gait").await;
     visit.press(&link(study)).await;

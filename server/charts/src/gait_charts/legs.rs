@@ -1,8 +1,8 @@
 //! The charts in which both legs are compared, as gait laboratories draw them: each leg over its own cycle, torques and
 //! powers normalised to body mass, forces in body weights.
 
-use super::cycle::{Cycle, Leg};
 use super::group::Group;
+use super::leg_cycle::{Cycle, Leg};
 use crate::gait_series::Point;
 use crate::{Chart, Stroke, band_in_words, over_reference_of_leg};
 use gait_optimizer::ReferenceGait;
@@ -76,8 +76,8 @@ pub(super) fn torques(cycle: &Cycle<'_>, mass_kg: f64) -> Group {
         let torque = |joint: usize| move |p: &Point<'_>| -p.u[joint] / mass_kg;
         of_legs(cycle, Chart::new(JOINTS[place], CYCLE, "torque, N m/kg"), torque(place), torque(3 + place))
     };
-    let hint = "Internal torques, normalised to the subject's body mass. Extension and plantarflexion are positive, the opposite of the \
-                angles and of the files. The prosthesis drives the right knee and ankle; the subject drives the other joints.";
+    let hint = "Internal torques, normalised to the subject's body mass. Extension and plantarflexion are positive; angles and \
+                exported files have the opposite sign. The prosthesis drives the right knee and ankle; the subject drives the other joints.";
     Group::new("torques", "Joint torques", hint, (0..3).map(draw).collect())
 }
 

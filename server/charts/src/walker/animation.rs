@@ -1,7 +1,7 @@
 //! A gait as a picture that moves by itself: one stride, repeated without end.
 
-use super::body::parts;
-use super::figure::{Pose, WalkerFigure, muscle_line, muscle_opacity, muscle_width, share_of_peak};
+use super::body_outline::parts;
+use super::gait_walker::{GaitWalker, Pose, muscle_line, muscle_opacity, muscle_width, share_of_peak};
 use super::muscle_paths::{is_left, muscle_paths};
 use super::segment::{Placement, Segment, UNITS_PER_M};
 use gait_optimizer::gait::stick_figure::StickFigure;
@@ -18,12 +18,12 @@ const LONGEST_STRIDE_M: f64 = 5.0;
 /// One stride of a walker that repeats.
 #[derive(Debug, Clone)]
 pub struct Animation {
-    walker: WalkerFigure,
+    walker: GaitWalker,
 }
 
 impl Animation {
     /// The animation of a figure.
-    pub fn new(walker: WalkerFigure) -> Self {
+    pub fn new(walker: GaitWalker) -> Self {
         Self { walker }
     }
 
@@ -65,7 +65,7 @@ impl Animation {
         let (wide, high) = self.size();
         write!(
             svg,
-            "<svg class=\"gait-figure\" width=\"{wide}\" height=\"{high}\" viewBox=\"{x} {y} {width} {height}\">"
+            "<svg class=\"gait-walker\" width=\"{wide}\" height=\"{high}\" viewBox=\"{x} {y} {width} {height}\">"
         )?;
         let pictures = self.pictures();
         if let (Some(first), Some(last)) = (pictures.first(), pictures.last()) {

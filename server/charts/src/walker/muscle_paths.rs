@@ -3,7 +3,7 @@
 //! The model of the muscles has moment arms, not attachments. These paths show on which side of which joints a muscle
 //! pulls; they are drawn, not computed.
 
-use super::body::Lengths;
+use super::body_outline::Lengths;
 use super::segment::Segment;
 use crate::gait_series::MUSCLES;
 use gait_optimizer::gait::stick_figure::StickFigure;

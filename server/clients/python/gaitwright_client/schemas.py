@@ -10,6 +10,10 @@ from typing import Any, Literal, Optional, TypedDict, Union
 # Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was refused.
 AccessKind = Literal["view", "export", "refused"]
 
+# Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study waits
+# for them; `both`, Gait RMSE answers, and people can add answers.
+AnswerSource = Literal["gait_rmse", "people", "both"]
+
 # What a person states instead of a preference between two gaits.
 AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
 
@@ -33,9 +37,6 @@ BlindPairKind = Literal["new", "repeat"]
 # `not_certified`, the gait has no certificate.
 CertificateState = Literal["passed", "failed", "being_certified", "not_certified"]
 
-# Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
-Condition = Literal["normal", "gait_a", "gait_b"]
-
 # Kind of entry: `given`, the subject gave consent; `withdrawn`, the subject withdrew it.
 ConsentKind = Literal["given", "withdrawn"]
 
@@ -53,10 +54,6 @@ Evaluation = Literal["optimizer", "script"]
 
 # Identifier of an entry of the feedback of a study.
 FeedbackId = str
-
-# Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study waits
-# for them; `mixed`, Gait RMSE answers, and people can add answers.
-FeedbackMode = Literal["automatic", "human", "mixed"]
 
 # The direction of a force: `x` forwards, `z` upwards.
 ForceAxis = Literal["x", "z"]
@@ -94,8 +91,8 @@ MeasurementFileId = str
 # or storage file (.mot, .sto).
 MeasurementFormat = Literal["csv", "opensim"]
 
-# Kind of measurement file: `emg`, an EMG recording; `motion`, joint angles.
-MeasurementKind = Literal["emg", "motion"]
+# Kind of measurement file: `emg`, an EMG recording; `joint_angles`, joint angles.
+MeasurementKind = Literal["emg", "joint_angles"]
 
 # Identifier of a membership in a study.
 MemberId = str
@@ -132,7 +129,7 @@ Right = Literal["read", "run", "answer", "rate", "device", "administer"]
 # gaits blind and records walks and answers in lab sessions.
 Role = Literal["administrator", "clinician", "rater"]
 
-# Decision of a safety review: `cleared`, somebody may walk with the gait; `unsafe`, it remains marked as unsafe.
+# Decision of a safety review: `cleared`, the gait may be used for walking; `unsafe`, it remains marked as unsafe.
 SafetyDecision = Literal["cleared", "unsafe"]
 
 # Identifier of a safety report.
@@ -169,7 +166,7 @@ Strikes = Literal["force", "kinematics", "ends"]
 StudyId = str
 
 # State of a study: `not_started`, not started; `running`, proposing and evaluating trials; `waiting`, for an answer
-# from a person; `paused`, by a user or a program; `finished`, the budget is used up or a stopping rule applied;
+# from a person; `paused`, by a user or a program; `finished`, all trials are made or a stopping rule applied;
 # `stopped`, by a user or a program.
 StudyState = Literal["not_started", "running", "waiting", "paused", "finished", "stopped"]
 
@@ -191,6 +188,9 @@ Unit = Literal["degrees", "radians"]
 
 # Identifier of a user.
 UserId = str
+
+# Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
+WalkCondition = Literal["normal", "gait_a", "gait_b"]
 
 # The gait from which a trial is warm-started: `incumbent`, the best gait so far, as in the published method; `root`,
 # the first gait of the study, which has the default bounds, so that the gait of an action does not depend on other
@@ -251,7 +251,19 @@ class AnswerReceipt(TypedDict):
     number: int
 
 
-class Ask(TypedDict, total=False):
+class _AnswerRetractionRequired(TypedDict):
+    # Why the answer is void.
+    reason: str
+
+
+class AnswerRetraction(_AnswerRetractionRequired, total=False):
+    """Retraction of a preference or an assessment."""
+
+    # Author of the retraction. Defaults to the caller's name.
+    author: Optional[str]
+
+
+class AskRequest(TypedDict, total=False):
     """A request for a trial."""
 
     # Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
@@ -337,9 +349,9 @@ AuditDetail = TypedDict(
         "could_have_known": "bool",
         # `gait.review`: the decision.
         "decision": "SafetyDecision",
-        # `session.refused`: number of failed attempts of the network.
+        # `sign_in.failures`: number of failed attempts of the network.
         "failed_attempts": "int",
-        # `session.refuse`, `session.wait`: number of failed attempts of the network so far.
+        # `sign_in.refused`, `sign_in.delay`: number of failed attempts of the network so far.
         "failed_attempts_of_network": "int",
         # `trial.certify`: reasons of a failed certificate; otherwise empty.
         "failures": "list[str]",
@@ -347,7 +359,7 @@ AuditDetail = TypedDict(
         "file": "str",
         # `study.import`: SHA-256 of the archive, hexadecimal.
         "file_sha256": "str",
-        # `session.refused`: time of the first attempt.
+        # `sign_in.failures`: time of the first attempt.
         "first_at": "Instant",
         # `subject.consent`: the consent form.
         "form": "str",
@@ -360,9 +372,9 @@ AuditDetail = TypedDict(
         "height_m": "Optional[float]",
         # `study.prune`: trials whose gaits were kept.
         "kept": "list[TrialId]",
-        # Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.record`).
+        # Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.upload`).
         "kind": "AuditedKind",
-        # `session.refused`: time of the last attempt.
+        # `sign_in.failures`: time of the last attempt.
         "last_at": "Instant",
         # Identifier of the member: `study.member_add`, `study.member_end`.
         "member": "MemberId",
@@ -370,9 +382,9 @@ AuditDetail = TypedDict(
         "muscles": "MuscleParameters",
         # Name of the object, of the member, or of the user who tried to sign in.
         "name": "str",
-        # `session.refused`: number of different names that were tried.
+        # `sign_in.failures`: number of different names that were tried.
         "names": "int",
-        # Network of the address: `session.refuse`, `session.refused`, `session.wait`.
+        # Network of the address: `sign_in.refused`, `sign_in.failures`, `sign_in.delay`.
         "network": "str",
         # Note about the answer, walk or session.
         "note": "str",
@@ -380,6 +392,8 @@ AuditDetail = TypedDict(
         "notes": "str",
         # Number of the trial, lab session, blind pair or answer.
         "number": "int",
+        # `trial.relax`: number of trials of the study.
+        "number_of_trials": "int",
         # `suggestion.give`: the trial whose gait the suggestion improves.
         "over": "TrialId",
         # `study.change`: maximum number of trials that run at once.
@@ -390,15 +404,15 @@ AuditDetail = TypedDict(
         "priority": "int",
         # `subject.add`: the pseudonym.
         "pseudonym": "str",
-        # Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind`.
+        # Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind_rater`.
         "rater": "str",
         # Reason for the change, or why an answer was not used. Null if none was given.
         "reason": "Optional[str]",
-        # `lab_session.record`: the measurement file.
+        # `lab_session.upload`: the measurement file.
         "recording": "MeasurementFileId",
         # `lab_session.process`: the measurement files that were processed.
         "recordings": "list[MeasurementFileId]",
-        # `trial.explain`: name of a bound with a relaxed value of which a gait exists. Null if none was found.
+        # `trial.explain`: name of the bound that gives a gait if it is relaxed. Null if there is none.
         "relaxed_bound": "Optional[str]",
         # Whether only members see the study: `study.create`, `study.restrict`.
         "restricted": "bool",
@@ -410,20 +424,23 @@ AuditDetail = TypedDict(
         "safety_reports": "list[AuditedSafetyReport]",
         # `record.backup`: true.
         "scheduled": "bool",
-        # `token.make`: scopes of the token.
+        # `token.create`: scopes of the token.
         "scopes": "list[Right]",
         # `trial.ask`: name of the script.
         "script": "str",
-        # Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.simulate`).
+        # Seed of the study (`study.create`) or of simulated walks (`trial.request_execution_report`,
+        # `trial.report_execution`).
         "seed": "int",
         # `session.end`: the sign-in session.
         "session": "SessionId",
         # `lab_session.process`: filters.
         "settings": "EmgSettings",
-        # `lab_session.record`: SHA-256 of the file, hexadecimal.
+        # `lab_session.upload`: SHA-256 of the file, hexadecimal.
         "sha256": "str",
         # `study.import`: public key of the signature, hexadecimal. Null without a signature.
         "signed_by": "Optional[str]",
+        # Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
+        "simulated_walks": "int",
         # State, as in `StudyState` (`study.create`, `study.extend`) or `TrialState` (`trial.tell`).
         "state": "str",
         # `subject.withdraw`: studies that were stopped.
@@ -442,16 +459,12 @@ AuditDetail = TypedDict(
         "trial_a": "TrialId",
         # Trial of gait B, as `trial_a`.
         "trial_b": "TrialId",
-        # `trial.relax`: number of trials of the study.
-        "trial_budget": "int",
         # `study.import`: whether the key of the signature is trusted.
         "trusted": "bool",
         # `study.import`: number of gaits whose Gait RMSE could not be computed again.
         "unchecked_rmse": "int",
-        # Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.record`, `lab_session.walk`.
+        # Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.upload`, `lab_session.record_walk`.
         "walk": "int",
-        # Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.simulate`.
-        "walks": "int",
         # `trial.relax`: the trial without a gait whose bounds were relaxed.
         "without_gait": "TrialId",
     },
@@ -554,10 +567,23 @@ class BlindMotion(TypedDict):
 
     # 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
     # and of the right leg) as forward and upward coordinates, m.
-    figures: list[list[list[float]]]
+    stick_figures: list[list[list[float]]]
 
 
-class Body(TypedDict):
+class BlindPair(TypedDict):
+    """Pair to compare, as shown to a rater."""
+
+    # Code of the pair.
+    code: str
+    # URL of the motion that is shown first.
+    first: str
+    # Number of the pair for this rater.
+    number: int
+    # URL of the motion that is shown second.
+    second: str
+
+
+class BodyMeasures(TypedDict):
     """Height and mass of a subject."""
 
     # Body mass, kg.
@@ -696,37 +722,13 @@ class CertifiedSubject(TypedDict):
     height_m: float
 
 
-class Change(TypedDict, total=False):
-    """Changes to a study. Absent fields keep their values."""
-
-    # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
-    # before its start and after its end.
-    archived: Optional[bool]
-    # Name shown to users.
-    name: Optional[str]
-    # Free-text notes.
-    notes: Optional[str]
-    # Number of trials that run in parallel.
-    parallel_trials: Optional[int]
-    # Priority, -10 to 10. Studies with a higher priority run first.
-    priority: Optional[int]
-    # Tags, at most 10 of at most 40 characters. They replace the present ones.
-    tags: Optional[list[str]]
-
-
-class Closing(TypedDict, total=False):
-    """Closing of a session."""
-
-    # Note, at most 2000 characters.
-    note: str
-
-
 class _ConflictRequired(TypedDict):
     # The bounds. Empty if the fixed constraints conflict with each other.
     bounds: list[BoundValue]
     # Number of starting points of the search.
     starts: int
-    # Whether a solve ended undecided, such as `stalled` or `time_limit`. If so, infeasibility is not certain.
+    # Whether a solve ended without a decision, for example as `stalled` or `time_limit`. If so, infeasibility is not
+    # certain.
     undecided: bool
     # Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
     # loosest, worst first.
@@ -758,6 +760,13 @@ class Consent(TypedDict):
     note: str
     # Sequence number.
     seq: int
+
+
+class ConsentWithdrawal(TypedDict):
+    """A withdrawal of consent."""
+
+    # Reason, 1 to 2000 characters, or `none given` if the subject gave none.
+    reason: str
 
 
 class ContactRowName(TypedDict):
@@ -870,15 +879,6 @@ class Correction(TypedDict):
     seq: int
 
 
-class CreatedInvitation(TypedDict):
-    """Invited rater."""
-
-    # The membership.
-    member: Member
-    # Path of the one-time sign-in link, which is shown once and valid for a day.
-    path: str
-
-
 class _PreferenceRequired(TypedDict):
     # Name or pseudonym of the person who answered.
     author: str
@@ -903,7 +903,7 @@ class _PreferenceRequired(TypedDict):
 
 
 class Preference(_PreferenceRequired, total=False):
-    """A preference, a tie or a suggestion of a study."""
+    """A preference or a suggestion of a study."""
 
     # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
@@ -914,6 +914,15 @@ class CreatedPreference(Preference):
 
     # Identifiers of other people's preferences about the same two gaits, at most the twenty newest.
     other_answers: list[FeedbackId]
+
+
+class CreatedRaterInvitation(TypedDict):
+    """Invited rater."""
+
+    # The membership.
+    member: Member
+    # Path of the one-time sign-in link, which is shown once and valid for a day.
+    path: str
 
 
 class _TokenRequired(TypedDict):
@@ -943,6 +952,20 @@ class CreatedToken(Token):
 
     # Secret, shown once. Send it as `Authorization: Bearer SECRET`.
     secret: str
+
+
+class _CurrentUserRequired(TypedDict):
+    # Name of the user or the token.
+    name: str
+    # Rights of the caller.
+    rights: list[Right]
+
+
+class CurrentUser(_CurrentUserRequired, total=False):
+    """Caller of the request."""
+
+    # Role of the user. Null for tokens.
+    role: Optional[Role]
 
 
 class CycleActivity(TypedDict):
@@ -1080,6 +1103,13 @@ class DomainTrajectory(_DomainTrajectoryRequired, total=False):
     muscles: Optional[MuscleTrajectory]
 
 
+class EmgProcessing(TypedDict, total=False):
+    """Settings of EMG processing."""
+
+    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
+    settings: EmgSettings
+
+
 class EmgReading(TypedDict, total=False):
     """How to read an EMG recording."""
 
@@ -1148,20 +1178,21 @@ class EmgView(TypedDict):
 
 
 class _ExecutionReportRequired(TypedDict):
-    # Range from which the body masses of disturbed walks are drawn, kg: ±5 %, limited to the range of the model.
+    # Range from which the body masses of disturbed simulated walks are drawn, kg: ±5 %, limited to the range of the
+    # model.
     body_mass_kg: list[float]
     # Version of this layout and of the simulation.
     format_version: int
     # SHA-256 of the gait as compact JSON, as in its certificate.
     gait_sha256: str
-    # Randomly disturbed walks, for each kind of ground.
-    grounds: list[WalksOnGround]
+    # Randomly disturbed simulated walks, for each kind of ground.
+    grounds: list[SimulatedWalksOnGround]
     # Seed of the disturbances.
     seed: int
     # Strides of a complete simulated walk.
     strides: int
-    # Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
-    # 0.01 m under body weight.
+    # Undisturbed simulated walks on level ground, ordered from hard ground to soft ground. In all others the ground
+    # yields 0.01 m under body weight.
     strides_by_yield: list[StridesOnYield]
     # Completed strides without any disturbance.
     undisturbed_strides: int
@@ -1174,41 +1205,13 @@ class ExecutionReport(_ExecutionReportRequired, total=False):
     pushes: Optional[SurvivedPushes]
 
 
-class Extend(TypedDict):
-    """A larger number of trials."""
+class FloquetMultiplier(TypedDict):
+    """A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map."""
 
-    # Total number of trials. Must exceed the current budget.
-    trial_budget: int
-
-
-class StickFigure(TypedDict):
-    """Points of the body at an instant as forward and upward coordinates, m."""
-
-    # Hip.
-    hip: list[float]
-    # Left (intact) leg.
-    left: LegPoints
-    # Right (prosthetic) leg.
-    right: LegPoints
-    # Shoulder.
-    shoulder: list[float]
-    # Time from the start of the stride, s.
-    time_s: float
-
-
-class _FrameRequired(StickFigure):
-    # Name of the domain.
-    domain: str
-    # Ground forces on left heel, left toe, right heel and right toe, forward and up, N.
-    forces_n: list[list[float]]
-
-
-class Frame(_FrameRequired, total=False):
-    """Node of a motion."""
-
-    # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
-    # muscles.
-    activations: Optional[list[float]]
+    # Imaginary part.
+    imaginary: float
+    # Real part.
+    real: float
 
 
 class GaitDocument(TypedDict):
@@ -1239,6 +1242,17 @@ class GaitDocument(TypedDict):
     stride_time_s: float
     # The subject.
     subject: WalkerSubject
+
+
+class GaitMotion(TypedDict):
+    """Motion of a gait over one stride from right heel strike."""
+
+    # Nodes in order of time. Interpolate linearly between them.
+    frames: list[MotionFrame]
+    # Stride length, m.
+    stride_length_m: float
+    # Stride time, s.
+    stride_time_s: float
 
 
 class GaitProblem(TypedDict):
@@ -1440,13 +1454,6 @@ class Import(_ImportRequired, total=False):
     signed_by: Optional[str]
 
 
-class Invitation(TypedDict):
-    """Rater to invite."""
-
-    # Name or code of the rater, 1 to 80 characters. A new name adds a rater.
-    name: str
-
-
 class Iteration(TypedDict):
     """One iteration of a solve."""
 
@@ -1463,7 +1470,7 @@ class Iteration(TypedDict):
     # Objective of the phase.
     objective: float
     # Phase of the solve: `tracking` and `muscle_tracking`, tracking of the reference gait without and with muscles;
-    # `plain_cost`, minimisation of the cost of transport without muscles, before that with muscles; `cost`,
+    # `plain_cost`, minimisation of the cost of transport without muscles, which precedes the one with muscles; `cost`,
     # minimisation of the cost of transport; `inter_node`, minimisation with tightened bounds.
     phase: str
     # Primal step length.
@@ -1496,6 +1503,20 @@ class Job(_JobRequired, total=False):
     trial_id: Optional[TrialId]
 
 
+class JointAngleReading(TypedDict, total=False):
+    """How to read a file with joint angles."""
+
+    # Cut-off frequency of the low-pass filter before differentiation, Hz.
+    cutoff_hz: float
+    # Name of the file, as it is shown.
+    file_name: Optional[str]
+    # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
+    # knee_R_rad, ankle_R_rad.
+    format: MeasurementFormat
+    # Unit of angles, if the header of an OpenSim file does not state it.
+    unit: Optional[Unit]
+
+
 class JointRelaxation(TypedDict):
     """Effect of relaxing several tuned bounds together, each by the same fraction of the way to its loosest value.
     Computed if no single relaxation gives a gait.
@@ -1507,7 +1528,7 @@ class JointRelaxation(TypedDict):
     solves: int
     # Number of starting points of the search at the `not_with` values.
     starts: int
-    # Whether a solve at the `not_with` values ended undecided. If so, infeasibility is not certain.
+    # Whether a solve at the `not_with` values ended without a decision. If so, infeasibility is not certain.
     undecided: bool
 
 
@@ -1529,6 +1550,13 @@ class LabAnswer(TypedDict):
     number: int
 
 
+class LabSessionClosing(TypedDict, total=False):
+    """Closing of a session."""
+
+    # Note, at most 2000 characters.
+    note: str
+
+
 class _LabSessionProgressRequired(TypedDict):
     # Whether the current answer can be retracted: the session is neither closed nor unblinded, and the answer is not a
     # safety report.
@@ -1536,7 +1564,7 @@ class _LabSessionProgressRequired(TypedDict):
     # Whether the session is closed.
     closed: bool
     # Identifier of the session.
-    session: LabSessionId
+    lab_session_id: LabSessionId
     # Number of walks.
     walks: int
 
@@ -1565,6 +1593,13 @@ class LabSessionStep(TypedDict):
     created_at: Instant
     # Reason or note.
     note: str
+
+
+class LabSessionUnblinding(TypedDict):
+    """Session to unblind, with the reason."""
+
+    # Reason, 1 to 2000 characters.
+    reason: str
 
 
 class _LabSessionViewRequired(TypedDict):
@@ -1636,6 +1671,10 @@ class LearnerSettings(TypedDict, total=False):
     # best action of a posterior sample over the whole search space; `information_gain`, the action whose feedback is
     # expected to tell the most about the utility; `random`, a random action that has not been tried.
     method: Literal["linecospar", "eubo", "thompson", "information_gain", "random"]
+    # Noise scale of answers of no difference, in units of utility.
+    no_difference_noise: float
+    # Difference in utility below which two gaits feel equal.
+    no_difference_width: float
     # Variance added to the diagonal of the prior covariance, called *GP noise* in the literature.
     nugget: float
     # Noise scale of labels, in units of utility.
@@ -1655,10 +1694,6 @@ class LearnerSettings(TypedDict, total=False):
     signal_variance: float
     # First action of a study: `random`, a random one; `centre`, the middle value of every dimension.
     start: Literal["random", "centre"]
-    # Noise scale of ties, in units of utility.
-    tie_noise: float
-    # Difference in utility below which two gaits feel equal.
-    tie_width: float
 
 
 class LegPoints(TypedDict):
@@ -1704,20 +1739,6 @@ class LinearAlgebra(TypedDict):
     substitutions: int
 
 
-class _MeRequired(TypedDict):
-    # Name of the user or the token.
-    name: str
-    # Rights of the caller.
-    rights: list[Right]
-
-
-class Me(_MeRequired, total=False):
-    """Caller of the request."""
-
-    # Role of the user. Null for tokens.
-    role: Optional[Role]
-
-
 class _MeasurementFileRequired(TypedDict):
     # Who uploaded it.
     actor: str
@@ -1727,10 +1748,10 @@ class _MeasurementFileRequired(TypedDict):
     id: MeasurementFileId
     # Kind of measurement.
     kind: MeasurementKind
+    # Identifier of the lab session.
+    lab_session_id: LabSessionId
     # SHA-256 of the file.
     raw_sha256: str
-    # Identifier of the lab session.
-    session_id: LabSessionId
     # Number of the walk, 1 to 3.
     walk: int
 
@@ -1813,38 +1834,34 @@ class ModelActivity(_ModelActivityRequired, total=False):
     correlation: Optional[float]
 
 
-class Motion(TypedDict):
-    """Motion of a gait over one stride from right heel strike."""
+class StickFigure(TypedDict):
+    """Points of the body at an instant as forward and upward coordinates, m."""
 
-    # Nodes in order of time. Interpolate linearly between them.
-    frames: list[Frame]
-    # Stride length, m.
-    stride_length_m: float
-    # Stride time, s.
-    stride_time_s: float
-
-
-class MotionReading(TypedDict, total=False):
-    """How to read a file with joint angles."""
-
-    # Cut-off frequency of the low-pass filter before differentiation, Hz.
-    cutoff_hz: float
-    # Name of the file, as it is shown.
-    file_name: Optional[str]
-    # File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
-    # knee_R_rad, ankle_R_rad.
-    format: MeasurementFormat
-    # Unit of angles, if the header of an OpenSim file does not state it.
-    unit: Optional[Unit]
+    # Hip.
+    hip: list[float]
+    # Left (intact) leg.
+    left: LegPoints
+    # Right (prosthetic) leg.
+    right: LegPoints
+    # Shoulder.
+    shoulder: list[float]
+    # Time from the start of the stride, s.
+    time_s: float
 
 
-class Multiplier(TypedDict):
-    """A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map."""
+class _MotionFrameRequired(StickFigure):
+    # Name of the domain.
+    domain: str
+    # Ground forces on left heel, left toe, right heel and right toe, forward and up, N.
+    forces_n: list[list[float]]
 
-    # Imaginary part.
-    imaginary: float
-    # Real part.
-    real: float
+
+class MotionFrame(_MotionFrameRequired, total=False):
+    """Node of a motion."""
+
+    # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
+    # muscles.
+    activations: Optional[list[float]]
 
 
 class MuscleParametersGas(TypedDict, total=False):
@@ -2050,7 +2067,21 @@ class NewExecutionReport(TypedDict, total=False):
     # Seed of the disturbances. The same seed gives the same report.
     seed: int
     # Number of simulated walks on each kind of ground, 1 to 1000.
-    walks: int
+    simulated_walks: int
+
+
+class _NewJointAnglesRequired(TypedDict):
+    # Content of the file.
+    recording: str
+    # Number of the walk.
+    walk: int
+
+
+class NewJointAngles(_NewJointAnglesRequired, total=False):
+    """Joint angles of a walk."""
+
+    # How to read the file.
+    reading: JointAngleReading
 
 
 class _NewLabAnswerRequired(TypedDict):
@@ -2089,20 +2120,6 @@ class NewMember(TypedDict):
     kind: MemberKind
     # Name of an enabled user or a valid token.
     name: str
-
-
-class _NewMotionRequired(TypedDict):
-    # Content of the file.
-    recording: str
-    # Number of the walk.
-    walk: int
-
-
-class NewMotion(_NewMotionRequired, total=False):
-    """Joint angles of a walk."""
-
-    # How to read the file.
-    reading: MotionReading
 
 
 class _NewPreferenceRequired(TypedDict):
@@ -2201,14 +2218,14 @@ class _NewStudyRequired(TypedDict):
 class NewStudy(_NewStudyRequired, total=False):
     """A study to create. Every field except the subject has a default."""
 
+    # Who answers comparisons.
+    answer_source: AnswerSource
     # Values of the bounds that are not tuned.
     base_bounds: BaseBounds
     # Identifier of the device. The built-in one by default.
     device_id: Optional[DeviceId]
     # What evaluates trials.
     evaluation: Evaluation
-    # Who answers comparisons.
-    feedback_mode: FeedbackMode
     # Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
     # Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
@@ -2218,6 +2235,8 @@ class NewStudy(_NewStudyRequired, total=False):
     muscles: bool
     # Name shown to users. Made from subject and variant by default.
     name: Optional[str]
+    # Number of trials.
+    number_of_trials: int
     # Number of trials that run in parallel.
     parallel_trials: int
     # Priority, -10 to 10. Studies with a higher priority run first.
@@ -2239,8 +2258,6 @@ class NewStudy(_NewStudyRequired, total=False):
     solve_seconds_budget: Optional[float]
     # Whether to start the study immediately.
     start: bool
-    # Number of trials.
-    trial_budget: int
     # The study finishes when the best action has not changed over this many results.
     unchanged_limit: Optional[int]
     # The gait from which trials are warm-started.
@@ -2286,11 +2303,11 @@ class NewUser(TypedDict):
     role: Role
 
 
-class NextPair(TypedDict, total=False):
+class NextBlindPair(TypedDict, total=False):
     """Next pair for a rater."""
 
     # The pair. Null if no comparison is pending.
-    pair: Optional[Pair]
+    pair: Optional[BlindPair]
 
 
 class _OpenSolveRequired(TypedDict):
@@ -2322,19 +2339,6 @@ class Optimality(TypedDict):
     complementarity: float
     # Largest entry of the Lagrangian's gradient.
     dual_infeasibility: float
-
-
-class Pair(TypedDict):
-    """Pair to compare, as shown to a rater."""
-
-    # URL of the motion that is shown first.
-    first: str
-    # Number of the pair for this rater.
-    number: int
-    # URL of the motion that is shown second.
-    second: str
-    # Token of the pair.
-    token: str
 
 
 class PhasePortrait(TypedDict):
@@ -2370,7 +2374,7 @@ class PreferenceContentPreference(TypedDict):
     winner: TrialId
 
 
-class PreferenceContentTie(TypedDict):
+class PreferenceContentNoDifference(TypedDict):
     """Two trials are equally good."""
 
     # One trial.
@@ -2378,7 +2382,7 @@ class PreferenceContentTie(TypedDict):
     # The other trial.
     b: TrialId
     # Kind of preference.
-    kind: Literal["tie"]
+    kind: Literal["no_difference"]
 
 
 class PreferenceContentSuggestion(TypedDict):
@@ -2386,7 +2390,7 @@ class PreferenceContentSuggestion(TypedDict):
 
     # Kind of preference.
     kind: Literal["suggestion"]
-    # Trial that it would have been better than.
+    # Trial to which the suggested action is preferred.
     over: TrialId
     # Index of the suggested action.
     suggested: int
@@ -2436,13 +2440,6 @@ class Problem(_ProblemRequired, total=False):
     value: Any
 
 
-class Processing(TypedDict, total=False):
-    """Settings of EMG processing."""
-
-    # band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
-    settings: EmgSettings
-
-
 class _ProportionRequired(TypedDict):
     # Number of successes.
     count: int
@@ -2484,6 +2481,13 @@ class RaterAnswer(_RaterAnswerRequired, total=False):
     response_ms: Optional[int]
 
 
+class RaterInvitation(TypedDict):
+    """Rater to invite."""
+
+    # Name or code of the rater, 1 to 80 characters. A new name adds a rater.
+    name: str
+
+
 class _RaterReliabilityRequired(TypedDict):
     # Number of answers.
     answered: int
@@ -2507,6 +2511,15 @@ class RaterReliability(_RaterReliabilityRequired, total=False):
     # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Null until
     # the rater is unblinded, because it would reveal allocations.
     first_preferred: Optional[Proportion]
+
+
+class RaterUnblinding(TypedDict):
+    """Rater to unblind, with the reason."""
+
+    # Name of the rater.
+    rater: str
+    # Reason, 1 to 2000 characters.
+    reason: str
 
 
 class _RecommendedRequired(TypedDict):
@@ -2626,7 +2639,7 @@ _RelaxationRequired = TypedDict(
         "solves": "int",
         # Number of starting points of the search at the `not_with` value. 0 if unknown.
         "starts": "int",
-        # Whether the solve at the `not_with` value ended undecided. If so, infeasibility is not certain.
+        # Whether the solve at the `not_with` value ended without a decision. If so, infeasibility is not certain.
         "undecided": "bool",
     },
 )
@@ -2680,18 +2693,6 @@ class ResultDerivatives(TypedDict):
     speed_m_s: float
 
 
-class _RetractRequired(TypedDict):
-    # Why the answer is void.
-    reason: str
-
-
-class Retract(_RetractRequired, total=False):
-    """Retraction of a preference or an assessment."""
-
-    # Author of the retraction. Defaults to the caller's name.
-    author: Optional[str]
-
-
 class Retraction(TypedDict):
     """Retraction of an answer."""
 
@@ -2719,7 +2720,7 @@ class ReturnMap(TypedDict):
     # Largest modulus of the multipliers, from finite differences of simulated domains.
     largest_by_differences: float
     # Multipliers from variational equations and saltation matrices, largest first.
-    multipliers: list[Multiplier]
+    multipliers: list[FloquetMultiplier]
     # Fraction of a proportional change of all velocities that remains after one stride.
     speed_kept: float
     # Change in other coordinates that a proportional change of all velocities causes within one stride, relative to its
@@ -2779,7 +2780,7 @@ class SearchSpace(TypedDict):
 
 
 class _SensitivityToBoundRequired(TypedDict):
-    # The active constraints that it sets. Empty if small changes of the bound change nothing.
+    # The active constraints that contain the bound. Empty if small changes of the bound change nothing.
     active: list[ActiveConstraint]
     # Name of the bound.
     bound: str
@@ -2853,6 +2854,37 @@ class SignInLink(TypedDict):
     path: str
 
 
+class SimulatedWalksOnGround(TypedDict):
+    """Simulated walks on one kind of ground."""
+
+    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
+    # produce.
+    ankle_rate_limited_share: float
+    # Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
+    ankle_saturated_share: float
+    # Simulated walks that completed all strides.
+    completed: int
+    # Share of completed simulated walks.
+    completed_share: float
+    # 95 % confidence interval of this share (Wilson).
+    completed_share_interval: list[float]
+    # Simulated walks that ended with a fall.
+    fell: int
+    # Largest height of bumps and depth of dips in the ground, m.
+    ground_height_m: float
+    # Simulated walks that ended with a halt: the walker took no further step.
+    halted: int
+    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
+    # produce.
+    knee_rate_limited_share: float
+    # Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
+    knee_saturated_share: float
+    # Mean number of completed strides.
+    mean_strides: float
+    # Number of simulated walks.
+    simulated_walks: int
+
+
 class _SolveAttemptRequired(TypedDict):
     # Whether its gait is the result of the solve.
     chosen: bool
@@ -2911,8 +2943,8 @@ class SolveOptionsSolver(TypedDict, total=False):
     # Initial weight of the proximal term after steps that the line search shortened often. Default 1e-4. 0 disables the
     # term.
     proximal_first: float
-    # Number of iterations that begin with a decreasing regularisation after the unregularised matrix has had the wrong
-    # inertia twice in a row, one more for each further time. Default 4.
+    # After the unregularised matrix has had the wrong inertia twice in a row, this many iterations start from a reduced
+    # regularisation. Each further time adds one iteration. Default 4.
     regularisation_memory: int
     # Share of the violation at which the restoration phase ends if the filter accepts the point. Default 0.9.
     required_reduction: float
@@ -3014,6 +3046,13 @@ class SolveReport(_SolveReportRequired, total=False):
     optimality: Optional[Optimality]
 
 
+class StateChangeReason(TypedDict, total=False):
+    """Reason for a command."""
+
+    # Reason, at most 2000 characters.
+    reason: str
+
+
 class StridesOnYield(TypedDict):
     """Undisturbed simulated walk on ground of a given stiffness."""
 
@@ -3024,16 +3063,16 @@ class StridesOnYield(TypedDict):
 
 
 class _StudyPlanRequired(TypedDict):
+    # Who answers comparisons.
+    answer_source: AnswerSource
     # Values of bounds that are not tuned.
     base_bounds: Bounds
     # Height and mass used by solves, independent of later corrections.
-    body: Body
+    body: BodyMeasures
     # Identifier of the device.
     device_id: DeviceId
     # What evaluates trials.
     evaluation: Evaluation
-    # Who answers comparisons.
-    feedback_mode: FeedbackMode
     # Settings of the gait problem.
     gait_settings: GaitSettings
     # Settings of the learner.
@@ -3043,6 +3082,8 @@ class _StudyPlanRequired(TypedDict):
     muscles: bool
     # Name shown to users.
     name: str
+    # Number of trials.
+    number_of_trials: int
     # Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: int
     # Priority, -10 to 10. Studies with a higher priority run first.
@@ -3059,8 +3100,6 @@ class _StudyPlanRequired(TypedDict):
     solve_options: SolveOptions
     # Identifier of the subject.
     subject_id: SubjectId
-    # Number of trials.
-    trial_budget: int
     # The gait from which trials are warm-started.
     warm_start_from: WarmStartFrom
 
@@ -3103,28 +3142,39 @@ class Study(_StudyRequired, total=False):
     cloned_from: Optional[StudyId]
 
 
-class StudyAccess(TypedDict):
-    """Access to a study."""
+class StudyChange(TypedDict, total=False):
+    """Changes to a study. Absent fields keep their values."""
 
-    # Whether only members and administrators can access the study. Raters must be members in any case.
-    restricted: bool
+    # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
+    # before its start and after its end.
+    archived: Optional[bool]
+    # Name shown to users.
+    name: Optional[str]
+    # Free-text notes.
+    notes: Optional[str]
+    # Number of trials that run in parallel.
+    parallel_trials: Optional[int]
+    # Priority, -10 to 10. Studies with a higher priority run first.
+    priority: Optional[int]
+    # Tags, at most 10 of at most 40 characters. They replace the present ones.
+    tags: Optional[list[str]]
 
 
 class StudyClone(TypedDict, total=False):
     """A new study with the set-up of another one. Absent fields are copied."""
 
     # Who answers comparisons.
-    feedback_mode: Optional[FeedbackMode]
+    answer_source: Optional[AnswerSource]
     # Whether to solve with muscles.
     muscles: Optional[bool]
     # Name shown to users.
     name: Optional[str]
+    # Number of trials.
+    number_of_trials: Optional[int]
     # Seed for all random draws except allocations.
     seed: Optional[int]
     # Whether to start the study immediately.
     start: bool
-    # Number of trials.
-    trial_budget: Optional[int]
 
 
 class _StudyComparisonRequired(TypedDict):
@@ -3160,6 +3210,20 @@ class StudyComparison(_StudyComparisonRequired, total=False):
     best_gait_rmse_rad: Optional[float]
     # Number of the recommended trial. Null if there is no recommendation.
     best_trial: Optional[int]
+
+
+class StudyExtension(TypedDict):
+    """A larger number of trials."""
+
+    # Number of trials. Must exceed the current number.
+    number_of_trials: int
+
+
+class StudyRestriction(TypedDict):
+    """Access to a study."""
+
+    # Whether only members and administrators can access the study. Raters must be members in any case.
+    restricted: bool
 
 
 class StudyView(Study):
@@ -3219,12 +3283,12 @@ class SurvivedPushes(TypedDict):
     largest_tried_n_s: float
 
 
-class _TellRequired(TypedDict):
+class _TellRequestRequired(TypedDict):
     # Whether the evaluation found a gait.
     outcome: Outcome
 
 
-class Tell(_TellRequired, total=False):
+class TellRequest(_TellRequestRequired, total=False):
     """The outcome of a trial, as a script reports it."""
 
     # Cost of transport.
@@ -3243,13 +3307,6 @@ class TightenedBounds(TypedDict):
     # For each tightened variable a list of its number, from 0, and a list of two margins, of its lower and of its upper
     # bound.
     variables: list[list[MarginEntry]]
-
-
-class TransitionReason(TypedDict, total=False):
-    """Reason for a command."""
-
-    # Reason, at most 2000 characters.
-    reason: str
 
 
 class _TrialRequired(TypedDict):
@@ -3280,13 +3337,13 @@ class Trial(_TrialRequired, total=False):
 
     # Best trial when this one was proposed. Null if there was none.
     best_before: Optional[TrialId]
-    # Cost of transport of a converged gait, dimensionless. Null without one, and if the script that evaluated the trial
-    # did not report it.
+    # Cost of transport of a converged gait, dimensionless. Null if the trial has no converged gait, or if the script
+    # that evaluated it did not report the value.
     cost_of_transport: Optional[float]
     # Time at which it ended. Null while it is open.
     finished_at: Optional[Instant]
-    # Gait RMSE of a converged gait, rad. Null without one, and if the script that evaluated the trial did not report
-    # it. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
+    # Gait RMSE of a converged gait, rad. Null if the trial has no converged gait, or if the script that evaluated it
+    # did not report the value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Optional[float]
     # Number of interior-point iterations. Null without a completed solve.
     iterations: Optional[int]
@@ -3332,7 +3389,7 @@ class TrialExecutionReport(TypedDict):
     program: str
     # The report, as `gaitwright simulate --json` prints it.
     report: ExecutionReport
-    # How many walks were complete, as a sentence.
+    # How many simulated walks were complete, as a sentence.
     sentence: str
     # Trial of the gait.
     trial_id: TrialId
@@ -3379,22 +3436,6 @@ class TrialSensitivities(TypedDict):
     sentences: list[str]
     # Trial of the gait.
     trial_id: TrialId
-
-
-class Unblind(TypedDict):
-    """Rater to unblind, with the reason."""
-
-    # Name of the rater.
-    rater: str
-    # Reason, 1 to 2000 characters.
-    reason: str
-
-
-class UnblindSession(TypedDict):
-    """Session to unblind, with the reason."""
-
-    # Reason, 1 to 2000 characters.
-    reason: str
 
 
 class _UnblindedPairRequired(TypedDict):
@@ -3520,7 +3561,7 @@ class WalkView(_WalkViewRequired, total=False):
     """Walk of a session."""
 
     # Condition of the walk. Null while it is blinded.
-    condition: Optional[Condition]
+    condition: Optional[WalkCondition]
     # Who recorded the walk, and when. Null if it is not recorded yet.
     recorded: Optional[LabSessionStep]
 
@@ -3532,37 +3573,6 @@ class WalkerSubject(TypedDict):
     body_mass_kg: float
     # Body height, m.
     height_m: float
-
-
-class WalksOnGround(TypedDict):
-    """Simulated walks on one kind of ground."""
-
-    # Share of the time in which the controller demanded a faster change of the ankle torque than the actuator can
-    # produce.
-    ankle_rate_limited_share: float
-    # Share of the time in which the controller demanded more than the largest torque of the prosthetic ankle.
-    ankle_saturated_share: float
-    # Walks that completed all strides.
-    completed: int
-    # Share of completed walks.
-    completed_share: float
-    # 95 % confidence interval of this share (Wilson).
-    completed_share_interval: list[float]
-    # Walks that ended with a fall.
-    fell: int
-    # Largest height of bumps and depth of dips in the ground, m.
-    ground_height_m: float
-    # Walks that ended with a halt: the walker took no further step.
-    halted: int
-    # Share of the time in which the controller demanded a faster change of the knee torque than the actuator can
-    # produce.
-    knee_rate_limited_share: float
-    # Share of the time in which the controller demanded more than the largest torque of the prosthetic knee.
-    knee_saturated_share: float
-    # Mean number of completed strides.
-    mean_strides: float
-    # Number of simulated walks.
-    walks: int
 
 
 class _WarmStartRequired(TypedDict):
@@ -3580,13 +3590,6 @@ class WarmStart(_WarmStartRequired, total=False):
     # Margins by which bounds are tightened, because an earlier gait violated them between nodes. Absent if there are
     # none.
     margins: TightenedBounds
-
-
-class Withdrawal(TypedDict):
-    """A withdrawal of consent."""
-
-    # Reason, 1 to 2000 characters, or `none given` if the subject gave none.
-    reason: str
 
 
 class Worker(TypedDict):
@@ -3616,5 +3619,5 @@ MarginEntry = Union[int, list[float]]
 
 # Content of a preference, in terms of trials.
 PreferenceContent = Union[
-    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentTie, PreferenceContentSuggestion,
+    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentNoDifference, PreferenceContentSuggestion,
 ]

@@ -9,7 +9,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab_script::{self, Ask, SuggestedTrial, Tell};
+use gaitwright_service::studies::lab_script::{self, AskRequest, SuggestedTrial, TellRequest};
 use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Deserialize;
@@ -24,19 +24,19 @@ use std::sync::Arc;
     operation_id = "ask_for_trial",
     tag = "scripts",
     params(("id" = StudyId, Path, description = "Identifier of a study with `evaluation` = `script`")),
-    request_body(content = Ask, description = "Optional: the name of the script"),
+    request_body(content = AskRequest, description = "Optional: the name of the script"),
     responses((status = 200, description = "Trial that the script was already asked to evaluate", body = Trial), (status = 201, description = "New trial to evaluate", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn ask(
     State(mut app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    IdempotentWith(request, ask): IdempotentWith<Run, Ask>,
+    IdempotentWith(request, ask): IdempotentWith<Run, AskRequest>,
 ) -> Result<Response, Refusal> {
     let script = ask.script.as_deref().unwrap_or(&request.caller.name).trim();
     for _ in 0..MOST_TRIES {
-        let beliefs = Arc::clone(&app.beliefs);
-        let suggestion = lab_script::suggest(app.store_mut(), id, script, &beliefs).await;
+        let analyses = Arc::clone(&app.analyses);
+        let suggestion = lab_script::suggest(app.store_mut(), id, script, &analyses).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return repeat_ask(&app, before).await,
@@ -75,14 +75,14 @@ async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusa
     operation_id = "tell_outcome",
     tag = "scripts",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    request_body = Tell,
+    request_body = TellRequest,
     responses((status = 200, description = "Trial with its outcome", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn tell(
     State(mut app): State<AppState>,
     Id(id, _): Id<TrialId, Run>,
-    IdempotentWith(request, tell): IdempotentWith<Run, Tell>,
+    IdempotentWith(request, tell): IdempotentWith<Run, TellRequest>,
 ) -> Result<Response, Refusal> {
     for _ in 0..MOST_TRIES {
         let checked = lab_script::check_outcome(app.store_mut(), id, &tell).await;

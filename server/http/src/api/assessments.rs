@@ -1,6 +1,6 @@
 //! REST: assessments, which are answers about two gaits that state no preference.
 
-use super::preferences::Retract;
+use super::preferences::AnswerRetraction;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -95,14 +95,14 @@ pub(super) async fn get(
     operation_id = "retract_assessment",
     tag = "preferences",
     params(("id" = AssessmentId, Path, description = "Identifier of the assessment")),
-    request_body = Retract,
+    request_body = AnswerRetraction,
     responses((status = 200, description = "Retracted assessment", body = Assessment)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<AssessmentId, access::Answer>,
-    IdempotentWith(request, why): IdempotentWith<access::Answer, Retract>,
+    IdempotentWith(request, why): IdempotentWith<access::Answer, AnswerRetraction>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

@@ -3,7 +3,7 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::blind_motion::{BlindFigure, blind_motion, phase};
+use crate::blind_motion::{BlindStickFigure, blind_motion, phase};
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
@@ -23,9 +23,9 @@ use utoipa::ToSchema;
 
 /// Pair to compare, as shown to a rater.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Pair {
-    /// Token of the pair.
-    token: String,
+pub(super) struct BlindPair {
+    /// Code of the pair.
+    code: String,
     /// Number of the pair for this rater.
     number: u32,
     /// URL of the motion that is shown first.
@@ -36,9 +36,9 @@ pub(super) struct Pair {
 
 /// Next pair for a rater.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct NextPair {
+pub(super) struct NextBlindPair {
     /// The pair. Null if no comparison is pending.
-    pair: Option<Pair>,
+    pair: Option<BlindPair>,
 }
 
 /// Draw the next pair for a rater
@@ -50,7 +50,7 @@ pub(super) struct NextPair {
     operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "Pair that was drawn earlier, or null if no comparison is pending", body = NextPair), (status = 201, description = "New pair. `Location` is its first motion", body = NextPair)),
+    responses((status = 200, description = "Pair that was drawn earlier, or null if no comparison is pending", body = NextBlindPair), (status = 201, description = "New pair. `Location` is its first motion", body = NextBlindPair)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn next(
@@ -64,12 +64,12 @@ pub(super) async fn next(
     let answering = app.clone();
     let (writer, next) = blind::next(app.store_mut(), &request.caller, id).await?;
     let Some(HandedOut { shown: PairWithSides { pair, .. }, is_new }) = next else {
-        return request.done(&answering, writer, &NextPair { pair: None }).await;
+        return request.done(&answering, writer, &NextBlindPair { pair: None }).await;
     };
-    let motion = |side: &str| format!("/api/v1/blind-pairs/{}/motions/{side}", pair.token);
+    let motion = |side: &str| format!("/api/v1/blind-pairs/{}/motions/{side}", pair.code);
     let (first, second) = (motion("first"), motion("second"));
-    let pair = Pair { first: first.clone(), second, token: pair.token, number: pair.number };
-    let next = NextPair { pair: Some(pair) };
+    let pair = BlindPair { first: first.clone(), second, code: pair.code, number: pair.number };
+    let next = NextBlindPair { pair: Some(pair) };
     if is_new {
         request.created(&answering, writer, first, &next).await
     } else {
@@ -83,7 +83,7 @@ pub(super) struct BlindMotion {
     /// 101 stick figures over one stride. Each has ten points (hip, shoulder, then knee, ankle, heel and toe of the left
     /// and of the right leg) as forward and upward coordinates, m.
     #[schema(value_type = Vec<Vec<Vec<f64>>>)]
-    figures: Vec<BlindFigure>,
+    stick_figures: Vec<BlindStickFigure>,
 }
 
 /// Motion of a pair.
@@ -99,11 +99,11 @@ pub(super) enum PairSide {
 /// The phase at which motions start differs between pairs, and is the same for both motions of a pair.
 #[utoipa::path(
     get,
-    path = "/blind-pairs/{token}/motions/{side}",
+    path = "/blind-pairs/{code}/motions/{side}",
     operation_id = "get_blind_motion",
     tag = "blind",
     params(
-        ("token" = String, Path, description = "Token of the pair"),
+        ("code" = String, Path, description = "Code of the pair"),
         ("side" = inline(PairSide), Path, description = "Which motion of the pair")
     ),
     responses((status = 200, description = "Motion", body = BlindMotion), (status = 409, description = "The subject withdrew consent")),
@@ -112,10 +112,10 @@ pub(super) enum PairSide {
 pub(super) async fn motion(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path((token, side)): Path<(String, PairSide)>,
+    Path((code, side)): Path<(String, PairSide)>,
 ) -> Result<Json<BlindMotion>, Refusal> {
     let mut reader = app.read().await?;
-    let shown = blind::own_showable_pair(&mut reader, &authorized.caller, &token).await?;
+    let shown = blind::own_showable_pair(&mut reader, &authorized.caller, &code).await?;
     let (first, second) = shown.shown();
     let trial = match side {
         PairSide::First => first,
@@ -123,16 +123,16 @@ pub(super) async fn motion(
     };
     let gait = gaits::get(&mut reader, trial).await;
     drop(reader);
-    let phase = phase(&token);
+    let phase = phase(&code);
     let motion = match gait {
         Ok(gait) => app.compute(move |pool| blind_motion(&gait.unpack(pool)?, phase)).await.map_err(Error::from),
         Err(error) => Err(error.into()),
     };
     let motion = motion.flatten();
     // The error must not reveal the trial, the subject or the device.
-    motion.map(|figures| Json(BlindMotion { figures })).map_err(|error| {
+    motion.map(|stick_figures| Json(BlindMotion { stick_figures })).map_err(|error| {
         tracing::error!(%error, "cannot show a gait to a rater");
-        Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this token".to_owned() })
+        Refusal(Error::NotFound { what: "motion of the blind pair".to_owned(), id: "with this code".to_owned() })
     })
 }
 
@@ -141,24 +141,24 @@ pub(super) async fn motion(
 /// The first answer to a pair counts. A safety report takes effect at once.
 #[utoipa::path(
     post,
-    path = "/blind-pairs/{token}/answer",
+    path = "/blind-pairs/{code}/answer",
     operation_id = "answer_blind_pair",
     tag = "blind",
-    params(("token" = String, Path, description = "Token of the pair")),
+    params(("code" = String, Path, description = "Code of the pair")),
     request_body = RaterAnswer,
     responses((status = 200, description = "Confirmation", body = AnswerReceipt)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn answer(
     State(app): State<AppState>,
-    Path(token): Path<String>,
+    Path(code): Path<String>,
     IdempotentWith(request, given): IdempotentWith<Rate, RaterAnswer>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let (_, answered) = blind::answer(&mut writer, &request.caller, &token, &given).await?;
+    let (_, answered) = blind::answer(&mut writer, &request.caller, &code, &given).await?;
     request.done(&app, writer, &answered).await
 }
 
@@ -189,7 +189,7 @@ pub(super) async fn raters(
 /// Rater to unblind, with the reason.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Unblind {
+pub(super) struct RaterUnblinding {
     /// Name of the rater.
     rater: String,
     /// Reason, 1 to 2000 characters.
@@ -214,14 +214,14 @@ pub(super) struct UnblindedRater {
     operation_id = "unblind_rater",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    request_body = Unblind,
+    request_body = RaterUnblinding,
     responses((status = 200, description = "Pairs of the rater, in order", body = UnblindedRater)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
-    IdempotentWith(request, whose): IdempotentWith<Administer, Unblind>,
+    IdempotentWith(request, whose): IdempotentWith<Administer, RaterUnblinding>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

@@ -16,7 +16,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
 use gaitwright_service::studies::execution::{self, NewExecutionReport};
 use gaitwright_service::studies::execution_request;
-use gaitwright_store::execution_reports::{GaitSimulated, StoredReport};
+use gaitwright_store::execution_reports::{ExecutionReported, StoredReport};
 use gaitwright_store::{Instant, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -26,7 +26,7 @@ use utoipa::ToSchema;
 pub(super) struct TrialExecutionReport {
     /// Trial of the gait.
     trial_id: TrialId,
-    /// How many walks were complete, as a sentence.
+    /// How many simulated walks were complete, as a sentence.
     sentence: String,
     /// The report, as `gaitwright simulate --json` prints it.
     report: ExecutionReport,
@@ -38,7 +38,7 @@ pub(super) struct TrialExecutionReport {
 
 impl From<StoredReport> for TrialExecutionReport {
     fn from(kept: StoredReport) -> Self {
-        let StoredReport { simulated: GaitSimulated { trial_id, program, report, .. }, created_at } = kept;
+        let StoredReport { reported: ExecutionReported { trial_id, program, report, .. }, created_at } = kept;
         Self { trial_id, sentence: report.sentence(), report: report.into(), program, created_at }
     }
 }
@@ -68,7 +68,7 @@ pub(super) async fn get(
 /// Request the execution report of a trial
 ///
 /// The gait of the trial must have converged. Walks on level ground, and on ground uneven by ±5 mm and by ±10 mm, are
-/// simulated. The same number of walks and seed give the same report.
+/// simulated. The same number of simulated walks and seed give the same report.
 #[utoipa::path(
     post,
     path = "/trials/{id}/execution-report",
@@ -77,7 +77,7 @@ pub(super) async fn get(
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
     request_body = NewExecutionReport,
     responses(
-        (status = 200, description = "Finished job, if the newest report has this number of walks and this seed", body = Job),
+        (status = 200, description = "Finished job, if the newest report has this number of simulated walks and this seed", body = Job),
         (status = 202, description = "Job that simulates the walks, with lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),

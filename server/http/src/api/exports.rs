@@ -1,7 +1,7 @@
 //! REST: downloads of a trial: problem file, OpenSim motion file, controller file.
 
 use crate::AppState;
-use crate::access_log::OnlyWhileWalkable;
+use crate::access_log_layer::OnlyWhileWalkable;
 use crate::accessible::Id;
 use crate::attachment::attachment;
 use crate::authorization::Authorized;

@@ -5,7 +5,7 @@ use crate::accessible::{Id, Named, accessible};
 use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::{belief, lab_session, reference, study, trial};
+use crate::figures::{analysis, lab_session, reference_figures, study, trial};
 use crate::openapi_binary::Binary;
 use crate::problem_details::Refusal;
 use crate::visible::Visible;
@@ -109,8 +109,8 @@ pub(super) async fn of_session(
 /// Download a figure of the posterior
 #[utoipa::path(
     get,
-    path = "/studies/{id}/belief/figures/{file}",
-    operation_id = "get_belief_figure",
+    path = "/studies/{id}/analysis/figures/{file}",
+    operation_id = "get_analysis_figure",
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "Identifier of the study"),
@@ -121,14 +121,14 @@ pub(super) async fn of_session(
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
-pub(super) async fn of_belief(
+pub(super) async fn of_analysis(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(choice): Params<belief::AxisChoice>,
+    Params(choice): Params<analysis::AxisChoice>,
 ) -> Result<Response, Refusal> {
-    let figures = belief::figures(&mut app, id, choice).await?;
+    let figures = analysis::figures(&mut app, id, choice).await?;
     response(&mut app, figures, file).await
 }
 
@@ -152,7 +152,7 @@ pub(super) async fn of_reference(
     Path((_, file)): Path<(String, String)>,
 ) -> Result<Response, Refusal> {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?.definition;
-    response(&mut app, reference::of_reference(&reference), file).await
+    response(&mut app, reference_figures::of_reference(&reference), file).await
 }
 
 /// Responds with a figure in the format of the file name.

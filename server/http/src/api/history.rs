@@ -65,9 +65,9 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Refusal
     let study = studies::get(&mut reader, id).await?;
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
+    let analyses = Arc::clone(&app.analyses);
     let compute = move |pool: &OnPool| {
-        let best = ranking_to_show(pool, &snapshot, &beliefs)?.first().copied();
+        let best = ranking_to_show(pool, &snapshot, &analyses)?.first().copied();
         Ok(history::of(&snapshot, best))
     };
     app.compute(compute).await?.map_err(Error::Learner).map_err(Refusal)

@@ -10,7 +10,7 @@ use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
 use gaitwright_store::{BorrowedWriter, StudyId, TrialId, jobs};
@@ -73,7 +73,7 @@ impl Job {
     }
 
     /// The response to a request for a result: 202, or 200 if the result exists already.
-    pub(super) async fn respond<P: Permission>(
+    pub(super) async fn respond<P: RequiredRight>(
         request: &Idempotent<P>,
         app: &AppState,
         mut writer: BorrowedWriter<'_>,

@@ -159,7 +159,7 @@ pub(super) async fn controller(
 /// Closing of a session.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Closing {
+pub(super) struct LabSessionClosing {
     /// Note, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -175,14 +175,14 @@ pub(super) struct Closing {
     operation_id = "close_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    request_body = Closing,
+    request_body = LabSessionClosing,
     responses((status = 200, description = "Closed session", body = LabSessionView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn close(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    IdempotentWith(request, closing): IdempotentWith<Run, Closing>,
+    IdempotentWith(request, closing): IdempotentWith<Run, LabSessionClosing>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
@@ -195,7 +195,7 @@ pub(super) async fn close(
 /// Session to unblind, with the reason.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct UnblindSession {
+pub(super) struct LabSessionUnblinding {
     /// Reason, 1 to 2000 characters.
     #[schema(min_length = 1, max_length = 2000)]
     reason: String,
@@ -211,14 +211,14 @@ pub(super) struct UnblindSession {
     operation_id = "unblind_lab_session",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    request_body = UnblindSession,
+    request_body = LabSessionUnblinding,
     responses((status = 200, description = "Session with the condition of each walk", body = LabSessionView)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Administer>,
-    IdempotentWith(request, asked): IdempotentWith<Administer, UnblindSession>,
+    IdempotentWith(request, asked): IdempotentWith<Administer, LabSessionUnblinding>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

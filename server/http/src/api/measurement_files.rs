@@ -19,7 +19,7 @@ use axum::response::Response;
 use gait_optimizer::emg::EmgSettings;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self, CheckedFile, MeasurementFormat, NewEmg, NewMotion, UploadedFile};
+use gaitwright_service::studies::lab::{self, CheckedFile, MeasurementFormat, NewEmg, NewJointAngles, UploadedFile};
 use gaitwright_store::measurement_files::{self, MeasurementKind};
 use gaitwright_store::{LabSessionId, MeasurementFileId};
 use serde::Deserialize;
@@ -125,18 +125,18 @@ pub(super) async fn emg(
 /// Limit cycles are computed from the file.
 #[utoipa::path(
     post,
-    path = "/lab-sessions/{id}/measurement-files/motion",
-    operation_id = "create_motion_file",
+    path = "/lab-sessions/{id}/measurement-files/joint-angles",
+    operation_id = "create_joint_angle_file",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    request_body = NewMotion,
+    request_body = NewJointAngles,
     responses((status = 201, description = "Measurement file", body = MeasurementFile)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
-pub(super) async fn motion(
+pub(super) async fn joint_angles(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    IdempotentWith(request, new): IdempotentWith<Run, NewMotion>,
+    IdempotentWith(request, new): IdempotentWith<Run, NewJointAngles>,
 ) -> Result<Response, Refusal> {
     if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
@@ -163,7 +163,7 @@ async fn keep(
 /// Settings of EMG processing.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct Processing {
+pub(super) struct EmgProcessing {
     /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
     #[schema(value_type = documents::EmgSettings)]
     settings: EmgSettings,
@@ -186,14 +186,14 @@ fn of_settings(error: Error) -> Error {
     operation_id = "create_emg_result",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    request_body = Processing,
+    request_body = EmgProcessing,
     responses((status = 201, description = "Result", body = EmgView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn process(
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    IdempotentWith(request, processing): IdempotentWith<Run, Processing>,
+    IdempotentWith(request, processing): IdempotentWith<Run, EmgProcessing>,
 ) -> Result<Response, Refusal> {
     if let Some(before) = request.earlier_response(&app).await? {
         return Ok(before);
@@ -256,6 +256,6 @@ pub(super) async fn limit_cycles(
 fn kind_of_file(kind: MeasurementKind) -> &'static str {
     match kind {
         MeasurementKind::Emg => "emg",
-        MeasurementKind::Motion => "motion",
+        MeasurementKind::JointAngles => "joint-angles",
     }
 }

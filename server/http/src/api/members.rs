@@ -47,16 +47,16 @@ pub(super) async fn of_study(
     operation_id = "get_study_access",
     tag = "access",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "Access", body = StudyAccess)),
+    responses((status = 200, description = "Access", body = StudyRestriction)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn access(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Read>,
-) -> Result<Json<StudyAccess>, Refusal> {
+) -> Result<Json<StudyRestriction>, Refusal> {
     let restricted = members::is_restricted(&mut *app.read().await?, id).await?;
-    Ok(Json(StudyAccess { restricted }))
+    Ok(Json(StudyRestriction { restricted }))
 }
 
 /// Create a study member
@@ -138,7 +138,7 @@ pub(super) async fn end(
 /// Access to a study.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct StudyAccess {
+pub(super) struct StudyRestriction {
     /// Whether only members and administrators can access the study. Raters must be members in any case.
     restricted: bool,
 }
@@ -153,14 +153,14 @@ pub(super) struct StudyAccess {
     operation_id = "set_study_access",
     tag = "access",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    request_body = StudyAccess,
-    responses((status = 200, description = "Access", body = StudyAccess)),
+    request_body = StudyRestriction,
+    responses((status = 200, description = "Access", body = StudyRestriction)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn restrict(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
-    IdempotentWith(request, wanted): IdempotentWith<Run, StudyAccess>,
+    IdempotentWith(request, wanted): IdempotentWith<Run, StudyRestriction>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
@@ -173,7 +173,7 @@ pub(super) async fn restrict(
 /// Rater to invite.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Invitation {
+pub(super) struct RaterInvitation {
     /// Name or code of the rater, 1 to 80 characters. A new name adds a rater.
     #[schema(min_length = 1, max_length = 80)]
     name: String,
@@ -181,7 +181,7 @@ pub(super) struct Invitation {
 
 /// Invited rater.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct CreatedInvitation {
+pub(super) struct CreatedRaterInvitation {
     /// The membership.
     member: Member,
     /// Path of the one-time sign-in link, which is shown once and valid for a day.
@@ -197,19 +197,19 @@ pub(super) struct CreatedInvitation {
     operation_id = "create_invitation",
     tag = "access",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    request_body = Invitation,
-    responses((status = 201, description = "Invitation; the link is shown once", body = CreatedInvitation)),
+    request_body = RaterInvitation,
+    responses((status = 201, description = "Invitation; the link is shown once", body = CreatedRaterInvitation)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn invite(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Administer>,
-    IdempotentWith(request, whom): IdempotentWith<Administer, Invitation>,
+    IdempotentWith(request, whom): IdempotentWith<Administer, RaterInvitation>,
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
     let (_, member, secret) = membership::invite(&mut writer, &request.actor, id, &whom.name).await?;
     let location = address(member.id);
-    let invited = CreatedInvitation { member: member.into(), path: format!("/sign-in/{secret}") };
+    let invited = CreatedRaterInvitation { member: member.into(), path: format!("/sign-in/{secret}") };
     request.created(&app, writer, location, &invited).await
 }

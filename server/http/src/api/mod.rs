@@ -2,7 +2,6 @@
 //! described.
 
 mod access_log;
-mod archive;
 mod ask_tell;
 mod assessments;
 mod audit;
@@ -15,6 +14,7 @@ mod execution_reports;
 mod explanations;
 mod exports;
 mod figures;
+mod gait_motion;
 mod gaits;
 pub mod health;
 mod history;
@@ -22,7 +22,6 @@ mod jobs;
 mod lab_sessions;
 mod measurement_files;
 mod members;
-mod motion;
 mod preferences;
 mod recommendation;
 mod reference_gaits;
@@ -30,6 +29,7 @@ mod safety_reports;
 mod sensitivities;
 mod sessions;
 mod studies;
+mod study_archives;
 mod study_comparison;
 mod subjects;
 mod suggestions;
@@ -70,8 +70,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::of_study_csv))
         .routes(routes!(recommendation::of_study))
         .routes(routes!(recommendation::of_study_csv))
-        .routes(routes!(archive::of_study))
-        .routes(routes!(archive::imports_of_study))
+        .routes(routes!(study_archives::of_study))
+        .routes(routes!(study_archives::imports_of_study))
         .routes(routes!(history::of_study))
         .routes(routes!(history::of_study_csv))
         .routes(routes!(preferences::of_study, preferences::create))
@@ -94,7 +94,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(exports::problem))
         .routes(routes!(exports::motion_file))
         .routes(routes!(exports::controller))
-        .routes(routes!(motion::get))
+        .routes(routes!(gait_motion::get))
         .routes(routes!(certificates::get, certificates::create))
         .routes(routes!(execution_reports::get, execution_reports::create))
         .routes(routes!(sensitivities::get))
@@ -103,7 +103,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_study))
         .routes(routes!(figures::of_trial))
         .routes(routes!(figures::of_session))
-        .routes(routes!(figures::of_belief))
+        .routes(routes!(figures::of_analysis))
         .routes(routes!(figures::of_reference))
         // scripts of the lab
         .routes(routes!(ask_tell::ask))
@@ -124,7 +124,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(measurement_files::get))
         .routes(routes!(measurement_files::content))
         .routes(routes!(measurement_files::emg))
-        .routes(routes!(measurement_files::motion))
+        .routes(routes!(measurement_files::joint_angles))
         .routes(routes!(measurement_files::result, measurement_files::process))
         .routes(routes!(measurement_files::limit_cycles))
         .routes(routes!(lab_sessions::session_progress))

@@ -14,7 +14,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_service::access::{self, Read};
-use gaitwright_service::studies::answer::{self, Answer};
+use gaitwright_service::studies::pair_answer::{self, Answer};
 use gaitwright_store::feedback::{self, FeedbackContent};
 use gaitwright_store::{FeedbackId, StudyId, studies};
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
     for row in rows {
         let (kind, a, b) = match row.content {
             FeedbackContent::Preference { winner, loser } => ("preference", winner, loser),
-            FeedbackContent::Tie { a, b } => ("tie", a, b),
+            FeedbackContent::NoDifference { a, b } => ("no_difference", a, b),
             FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => continue,
         };
         let retraction = row.retraction.as_ref();
@@ -156,9 +156,10 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let given = answer::give(&mut writer, &request.caller, id, &answer).await?;
+    let given = pair_answer::give(&mut writer, &request.caller, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
-    let other_answers = answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
+    let other_answers =
+        pair_answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
     request.created(&app, writer, location, &CreatedPreference { row: row.into(), other_answers }).await
 }
@@ -166,7 +167,7 @@ pub(super) async fn create(
 /// Retraction of a preference or an assessment.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Retract {
+pub(super) struct AnswerRetraction {
     /// Why the answer is void.
     #[schema(min_length = 1, max_length = 2000)]
     pub(super) reason: String,
@@ -184,19 +185,19 @@ pub(super) struct Retract {
     operation_id = "retract_preference",
     tag = "preferences",
     params(("id" = FeedbackId, Path, description = "Identifier of the preference")),
-    request_body = Retract,
+    request_body = AnswerRetraction,
     responses((status = 200, description = "Retracted preference", body = Preference)),
     security(("token" = ["answer"]), ("session" = ["answer"])),
 )]
 pub(super) async fn retract(
     State(app): State<AppState>,
     Id(id, _): Id<FeedbackId, access::Answer>,
-    IdempotentWith(request, why): IdempotentWith<access::Answer, Retract>,
+    IdempotentWith(request, why): IdempotentWith<access::Answer, AnswerRetraction>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
+    let row = pair_answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
     request.done(&app, writer, &Preference::from(row)).await
 }

@@ -56,7 +56,7 @@ struct Recommended {
     /// Number of the trial.
     number: u32,
     /// The action: values of the bounds a1 to a8, tuned or fixed.
-    #[schema(value_type = study_plan_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::BoundsSchema)]
     bounds: TunedBounds,
     /// Gait RMSE of the trial, rad. Null if the script that evaluated the trial did not report it.
     gait_rmse_rad: Option<f64>,
@@ -78,7 +78,7 @@ impl Recommended {
 
 /// Get the recommendation of a study
 ///
-/// Of the actions tried, the one that the learner believes to be the best.
+/// Of the actions tried, the one with the highest utility.
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation",
@@ -138,10 +138,10 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
     let study = studies::get(&mut reader, id).await?;
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
+    let analyses = Arc::clone(&app.analyses);
     let rank = move |pool: &OnPool| {
         let unanswered = snapshot.waits_for_first_answer();
-        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(pool, &snapshot, &beliefs) };
+        let ranking = if unanswered { Ok(Vec::new()) } else { ranking_to_show(pool, &snapshot, &analyses) };
         (snapshot, ranking)
     };
     let (snapshot, ranking) = app.compute(rank).await?;
@@ -169,7 +169,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         return Err(Error::conflict(why).into());
     };
     let certification = certified_best::of_ranking(&mut reader, &ranking[place..]).await?;
-    let execution_report = execution::newest(&mut reader, trial.id).await?.map(|kept| kept.simulated.report);
+    let execution_report = execution::newest(&mut reader, trial.id).await?.map(|kept| kept.reported.report);
     drop(reader);
     Ok(Recommendation {
         study_id: id,

@@ -35,7 +35,7 @@ struct SensitivityToBound {
     bound: &'static str,
     /// Value of the bound, in its unit.
     value: f64,
-    /// The active constraints that it sets. Empty if small changes of the bound change nothing.
+    /// The active constraints that contain the bound. Empty if small changes of the bound change nothing.
     active: Vec<ActiveConstraint>,
     /// Derivatives of the results of the gait.
     derivatives: ResultDerivatives,

@@ -15,7 +15,7 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{StudyTransition, transitions_for_people};
-use gaitwright_service::studies::study_change::{self, Change, Extend, StudyClone};
+use gaitwright_service::studies::study_change::{self, StudyChange, StudyClone, StudyExtension};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::studies::{self, StudyFilter, StudyState};
 use gaitwright_store::{BorrowedWriter, Connection, StudyId, SubjectId, trials};
@@ -146,7 +146,7 @@ pub(super) async fn create(
 /// Reason for a command.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct TransitionReason {
+pub(super) struct StateChangeReason {
     /// Reason, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -162,7 +162,7 @@ pub(super) struct TransitionReason {
     operation_id = "start_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: the reason"),
+    request_body(content = StateChangeReason, description = "Optional: the reason"),
     responses((status = 200, description = "Started study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -170,7 +170,7 @@ pub(super) async fn start(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, StateChangeReason>,
 ) -> Result<Response, Refusal> {
     transition(&app, id, expected, &request, StudyTransition::Start, &why).await
 }
@@ -184,7 +184,7 @@ pub(super) async fn start(
     operation_id = "pause_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: the reason"),
+    request_body(content = StateChangeReason, description = "Optional: the reason"),
     responses((status = 200, description = "Paused study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -192,7 +192,7 @@ pub(super) async fn pause(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, StateChangeReason>,
 ) -> Result<Response, Refusal> {
     transition(&app, id, expected, &request, StudyTransition::Pause, &why).await
 }
@@ -206,7 +206,7 @@ pub(super) async fn pause(
     operation_id = "resume_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: the reason"),
+    request_body(content = StateChangeReason, description = "Optional: the reason"),
     responses((status = 200, description = "Resumed study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -214,7 +214,7 @@ pub(super) async fn resume(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, StateChangeReason>,
 ) -> Result<Response, Refusal> {
     transition(&app, id, expected, &request, StudyTransition::Resume, &why).await
 }
@@ -228,7 +228,7 @@ pub(super) async fn resume(
     operation_id = "stop_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body(content = TransitionReason, description = "Optional: the reason"),
+    request_body(content = StateChangeReason, description = "Optional: the reason"),
     responses((status = 200, description = "Stopped study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -236,7 +236,7 @@ pub(super) async fn stop(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, why): IdempotentWith<Run, TransitionReason>,
+    IdempotentWith(request, why): IdempotentWith<Run, StateChangeReason>,
 ) -> Result<Response, Refusal> {
     transition(&app, id, expected, &request, StudyTransition::Stop, &why).await
 }
@@ -247,7 +247,7 @@ async fn transition(
     expected: IfMatch,
     request: &Idempotent<Run>,
     transition: StudyTransition,
-    why: &TransitionReason,
+    why: &StateChangeReason,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(app).await? {
         Ok(writer) => writer,
@@ -274,7 +274,7 @@ async fn transition(
     operation_id = "update_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body = Change,
+    request_body = StudyChange,
     responses((status = 200, description = "Updated study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -282,7 +282,7 @@ pub(super) async fn patch(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, new): IdempotentWith<Run, Change>,
+    IdempotentWith(request, new): IdempotentWith<Run, StudyChange>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,
@@ -304,7 +304,7 @@ pub(super) async fn patch(
     operation_id = "extend_study",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
-    request_body = Extend,
+    request_body = StudyExtension,
     responses((status = 200, description = "Extended study", body = StudyView)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
@@ -312,7 +312,7 @@ pub(super) async fn extend(
     State(app): State<AppState>,
     Id(id, _): Id<StudyId, Run>,
     expected: IfMatch,
-    IdempotentWith(request, more): IdempotentWith<Run, Extend>,
+    IdempotentWith(request, more): IdempotentWith<Run, StudyExtension>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

@@ -53,7 +53,7 @@ pub(super) struct StudyComparison {
     /// Number of the recommended trial. Null if there is no recommendation.
     best_trial: Option<u32>,
     /// Action of the recommended trial. Null if there is no recommendation.
-    #[schema(value_type = Option<study_plan_schemas::Bounds>)]
+    #[schema(value_type = Option<study_plan_schemas::BoundsSchema>)]
     best_action: Option<TunedBounds>,
     /// Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
     /// trial did not report it. Null in every row if the compared studies have different reference gaits, because
@@ -122,9 +122,9 @@ async fn row(app: &mut AppState, study: Study) -> Result<StudyComparison, Refusa
     let counts = trials::counts(&mut reader, id).await?;
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
+    let analyses = Arc::clone(&app.analyses);
     let rank = move |pool: &OnPool| {
-        let best = ranking_to_show(pool, &snapshot, &beliefs);
+        let best = ranking_to_show(pool, &snapshot, &analyses);
         (snapshot, best)
     };
     let (snapshot, best) = app.compute(rank).await?;

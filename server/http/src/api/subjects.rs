@@ -14,7 +14,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::muscle::MuscleParameters;
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
+use gaitwright_service::studies::consent::{self, ConsentWithdrawal, NewConsent};
 use gaitwright_service::studies::subject::{self, NewCorrection, NewSubject};
 use gaitwright_store::{SubjectId, consents, subjects};
 
@@ -139,14 +139,14 @@ pub(super) async fn consent(
     operation_id = "withdraw_consent",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "Identifier of the subject")),
-    request_body = Withdrawal,
+    request_body = ConsentWithdrawal,
     responses((status = 200, description = "Withdrawal", body = Consent)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn withdraw(
     State(app): State<AppState>,
     DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
-    IdempotentWith(request, why): IdempotentWith<Run, Withdrawal>,
+    IdempotentWith(request, why): IdempotentWith<Run, ConsentWithdrawal>,
 ) -> Result<Response, Refusal> {
     let mut writer = match request.begin(&app).await? {
         Ok(writer) => writer,

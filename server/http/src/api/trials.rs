@@ -20,8 +20,8 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
 use gaitwright_service::studies::command;
+use gaitwright_store::trial_query::{self, Listing, SORTS};
 use gaitwright_store::trials::{self, TrialState};
-use gaitwright_store::trials_table::{self, Listing, SORTS};
 use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -78,7 +78,7 @@ pub(super) async fn of_study(
         limit: paging.to_read(),
         offset,
     };
-    let places: Vec<(u32, TrialId)> = trials_table::of_study(&mut reader, id, &listing)
+    let places: Vec<(u32, TrialId)> = trial_query::of_study(&mut reader, id, &listing)
         .await?
         .iter()
         .map(|row| row.id)
@@ -158,7 +158,7 @@ pub(super) async fn cancel(
 
 /// Retry a trial
 ///
-/// Queues a trial again that ended without a result. The job of its solve can be followed and cancelled.
+/// Requeues a trial that ended without a result. The job of its solve can be followed and cancelled.
 #[utoipa::path(
     post,
     path = "/trials/{id}/retry",

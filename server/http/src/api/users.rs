@@ -20,7 +20,7 @@ use utoipa::ToSchema;
 
 /// Caller of the request.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Me {
+pub(super) struct CurrentUser {
     /// Name of the user or the token.
     name: String,
     /// Role of the user. Null for tokens.
@@ -37,13 +37,13 @@ pub(super) struct Me {
     path = "/me",
     operation_id = "get_caller",
     tag = "access",
-    responses((status = 200, description = "Caller", body = Me)),
+    responses((status = 200, description = "Caller", body = CurrentUser)),
     security(("token" = []), ("session" = [])),
 )]
-pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<Me>, Refusal> {
+pub(super) async fn me(SignedIn(caller): SignedIn) -> Result<Json<CurrentUser>, Refusal> {
     let caller = caller.ok_or_else(not_signed_in)?;
     let rights = Right::ALL.into_iter().filter(|right| caller.may(*right)).collect();
-    Ok(Json(Me { name: caller.name, role: caller.role, rights }))
+    Ok(Json(CurrentUser { name: caller.name, role: caller.role, rights }))
 }
 
 /// List users

@@ -5,7 +5,9 @@ use gait_optimizer::emg::CycleActivity;
 use gait_optimizer::phase_portrait::JOINTS;
 use gaitwright_charts::gait_charts::orbit;
 use gaitwright_charts::{Chart, Figure, Span, Stroke};
-use gaitwright_service::studies::lab::{Condition, EmgPreview, EmgView, LabSessionView, LimitCycles, Stride, Trace};
+use gaitwright_service::studies::lab::{
+    EmgPreview, EmgView, LabSessionView, LimitCycles, Stride, Trace, WalkCondition,
+};
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Names of the EMG channels.
@@ -25,9 +27,9 @@ const JOINT_NAMES: [&str; 7] =
 pub(crate) fn walk_name(session: &LabSessionView, walk: u8) -> String {
     let condition = session.walks.iter().find(|known| known.number == walk).and_then(|known| known.condition);
     match condition {
-        Some(Condition::Normal) => "without the device".to_owned(),
-        Some(Condition::GaitA) => "gait A".to_owned(),
-        Some(Condition::GaitB) => "gait B".to_owned(),
+        Some(WalkCondition::Normal) => "without the device".to_owned(),
+        Some(WalkCondition::GaitA) => "gait A".to_owned(),
+        Some(WalkCondition::GaitB) => "gait B".to_owned(),
         None => format!("walk {walk}"),
     }
 }

@@ -1,10 +1,10 @@
-//! Figures of studies, trials, lab sessions, beliefs and reference gaits, for pages and for downloads.
+//! Figures of studies, trials, lab sessions, analyses and reference gaits, for pages and for downloads.
 
-pub(crate) mod belief;
+pub(crate) mod analysis;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 mod outcome;
-pub(crate) mod reference;
+pub(crate) mod reference_figures;
 pub(crate) mod study;
 mod study_progress;
 mod study_results;

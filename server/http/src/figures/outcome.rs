@@ -2,13 +2,13 @@
 
 use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::history::{self, Milestone};
-use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
+use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::{last_believed, ranking_to_show};
+use gaitwright_service::studies::trial_choice::{last_known_best, ranking_to_show};
 use gaitwright_store::TrialId;
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 
 /// What a study has found.
 #[derive(Default)]
@@ -22,9 +22,9 @@ pub(crate) struct StudyOutcome {
     /// The best action by iteration.
     history: Vec<Milestone>,
     /// Whether people are asked to compare two gaits.
-    pub(crate) question: bool,
+    pub(crate) comparison_pending: bool,
     /// The trial whose certificate the next comparison waits for.
-    pub(crate) question_after: Option<TrialId>,
+    pub(crate) comparison_after: Option<TrialId>,
 }
 
 impl StudyOutcome {
@@ -36,31 +36,31 @@ impl StudyOutcome {
         pool: &OnPool,
         snapshot: &StudySnapshot,
         large: bool,
-        beliefs: &Beliefs,
+        analyses: &Analyses,
     ) -> Result<Self, LearnerError> {
         if large {
             // A large study is not read completely, so the learner's last best action is used instead of the posterior.
-            let best = last_believed(snapshot);
+            let best = last_known_best(snapshot);
             let (ranking, history) = (best.into_iter().collect(), history::known(snapshot));
-            let question = snapshot.study.state == StudyState::Waiting;
-            return Ok(Self { best, ranking, history, question, ..Self::default() });
+            let comparison_pending = snapshot.study.state == StudyState::Waiting;
+            return Ok(Self { best, ranking, history, comparison_pending, ..Self::default() });
         }
-        let open = match snapshot.study.plan.feedback_mode {
-            FeedbackMode::Automatic => Question::None,
-            FeedbackMode::Human | FeedbackMode::Mixed => awaited_question(pool, snapshot)?,
+        let open = match snapshot.study.plan.answer_source {
+            AnswerSource::GaitRmse => PendingComparison::None,
+            AnswerSource::People | AnswerSource::Both => awaited_comparison(pool, snapshot)?,
         };
-        let question = open.trials().is_some();
-        let question_after = match open {
-            Question::AfterCertificate(trial) => Some(trial),
-            Question::None | Question::Pair(_) => None,
+        let comparison_pending = open.trials().is_some();
+        let comparison_after = match open {
+            PendingComparison::AfterCertificate(trial) => Some(trial),
+            PendingComparison::None | PendingComparison::Pair(_) => None,
         };
         if snapshot.waits_for_first_answer() {
-            return Ok(Self { unanswered: true, question, question_after, ..Self::default() });
+            return Ok(Self { unanswered: true, comparison_pending, comparison_after, ..Self::default() });
         }
-        let ranking = ranking_to_show(pool, snapshot, beliefs)?;
+        let ranking = ranking_to_show(pool, snapshot, analyses)?;
         let best = ranking.first().copied();
         let history = history::of(snapshot, best);
-        Ok(Self { best, ranking, history, question, question_after, ..Self::default() })
+        Ok(Self { best, ranking, history, comparison_pending, comparison_after, ..Self::default() })
     }
 
     /// Gait RMSE of the best action by iteration.

@@ -54,11 +54,11 @@ struct StudyWithBest {
 
 impl StudyWithBest {
     async fn read(app: &mut AppState, id: StudyId) -> Result<Self, Error> {
-        let beliefs = Arc::clone(&app.beliefs);
+        let analyses = Arc::clone(&app.analyses);
         let results = StudyResults::read(&mut *app.read().await?, id).await?;
         let draw = move |pool: &OnPool| {
-            let outcome = results.outcome(pool, &beliefs);
-            let utility = results.utility(pool, &beliefs);
+            let outcome = results.outcome(pool, &analyses);
+            let utility = results.utility(pool, &analyses);
             (results, outcome, utility)
         };
         let (results, outcome, utility) = app.compute(draw).await?;

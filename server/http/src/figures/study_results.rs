@@ -5,7 +5,7 @@ use super::utility::utility;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analyses, MOST_ANSWERS};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::TrialCounts;
@@ -49,15 +49,15 @@ impl StudyResults {
         Ok(Self { snapshot, subject, device, reference_gait, counts, feedback })
     }
 
-    pub(crate) fn outcome(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<StudyOutcome, Error> {
-        StudyOutcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, beliefs).map_err(Error::Learner)
+    pub(crate) fn outcome(&self, pool: &OnPool, analyses: &Analyses) -> Result<StudyOutcome, Error> {
+        StudyOutcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, analyses).map_err(Error::Learner)
     }
 
     /// The utility of the recommended gait over the answers of people; `None` of a large study.
-    pub(crate) fn utility(&self, pool: &OnPool, beliefs: &Beliefs) -> Result<Option<Figure>, Error> {
+    pub(crate) fn utility(&self, pool: &OnPool, analyses: &Analyses) -> Result<Option<Figure>, Error> {
         if self.counts.total as usize >= MANY || self.feedback > MOST_ANSWERS {
             return Ok(None);
         }
-        utility(pool, &self.snapshot, beliefs).map_err(Error::Learner)
+        utility(pool, &self.snapshot, analyses).map_err(Error::Learner)
     }
 }

@@ -3,10 +3,10 @@
 use crate::shared_state::AppState;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
-use gaitwright_charts::{Figure, WalkerFigure, gait_charts};
+use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::answer;
+use gaitwright_service::studies::pair_answer;
 use gaitwright_store::{TrialId, gaits, reference_gaits, studies, trials};
 
 /// Every figure of the page of a gait; while its solve runs, the solver progress.
@@ -27,7 +27,7 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
     let draw = move |pool: &OnPool| {
         let (gait, iterations) = (gait.unpack(pool)?, iterations.unpack(pool)?);
         let mut figures =
-            vec![gait_charts::tiles(stick_figures(&gait)?), gait_charts::animation(WalkerFigure::new(&gait)?)];
+            vec![gait_charts::tiles(stick_figures(&gait)?), gait_charts::animation(GaitWalker::new(&gait)?)];
         for group in gait_charts::of_gait(&gait, &reference)? {
             figures.extend(group.figures);
         }
@@ -44,7 +44,7 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
 pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, a).await?;
-    let other = answer::comparable(&mut reader, trial.study_id, "other", b).await?;
+    let other = pair_answer::comparable(&mut reader, trial.study_id, "other", b).await?;
     let reference = studies::get(&mut reader, trial.study_id).await?.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
     let (Some(gait_a), Some(gait_b)) = (gaits::find(&mut reader, a).await?, gaits::find(&mut reader, b).await?) else {

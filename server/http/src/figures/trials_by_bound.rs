@@ -1,11 +1,11 @@
 //! Trials by the values of their bounds: parallel coordinates of all bounds, and one chart for a single bound.
 
-use crate::format::{figure, meaning, signed};
+use crate::format::{decimal, meaning, signed};
 use gait_learner::LearnerError;
 use gaitwright_charts::{Chart, Figure, Parallel, ParallelAxis, ParallelLine, PointLink};
-use gaitwright_service::studies::belief::Belief;
+use gaitwright_service::studies::analysis::Analysis;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{Trial, TrialState};
 
 /// How many of the newest trials are drawn, so that the page stays light.
@@ -20,9 +20,9 @@ pub(crate) enum TrialMeasure {
 
 impl TrialMeasure {
     pub(crate) fn of(snapshot: &StudySnapshot) -> Self {
-        match snapshot.study.plan.feedback_mode {
-            FeedbackMode::Automatic => Self::GaitRmse,
-            FeedbackMode::Human | FeedbackMode::Mixed => Self::Utility,
+        match snapshot.study.plan.answer_source {
+            AnswerSource::GaitRmse => Self::GaitRmse,
+            AnswerSource::People | AnswerSource::Both => Self::Utility,
         }
     }
 
@@ -35,17 +35,17 @@ impl TrialMeasure {
 
     fn in_words(self, value: f64) -> String {
         match self {
-            Self::GaitRmse => format!("Gait RMSE {} rad", figure(Some(value))),
+            Self::GaitRmse => format!("Gait RMSE {} rad", decimal(Some(value))),
             Self::Utility => format!("utility {}", signed(value)),
         }
     }
 
     /// `None` without a gait.
-    fn value(self, trial: &Trial, belief: &Belief) -> Result<Option<f64>, LearnerError> {
+    fn value(self, trial: &Trial, analysis: &Analysis) -> Result<Option<f64>, LearnerError> {
         Ok(match self {
             _ if trial.state != TrialState::Converged => None,
             Self::GaitRmse => trial.gait_rmse_rad,
-            Self::Utility => Some(belief.posterior.mean(trial.action_index)?),
+            Self::Utility => Some(analysis.posterior.mean(trial.action_index)?),
         })
     }
 }
@@ -58,11 +58,11 @@ struct DrawnTrial<'a> {
 }
 
 /// The newest results.
-fn drawn<'a>(snapshot: &'a StudySnapshot, belief: &Belief) -> Result<Vec<DrawnTrial<'a>>, LearnerError> {
+fn drawn<'a>(snapshot: &'a StudySnapshot, analysis: &Analysis) -> Result<Vec<DrawnTrial<'a>>, LearnerError> {
     let shown = TrialMeasure::of(snapshot);
     let results = snapshot.trials.iter().rev().filter(|trial| trial.state.is_result()).take(DRAWN);
     let draw = |trial: &'a Trial| {
-        let outcome = shown.value(trial, belief)?;
+        let outcome = shown.value(trial, analysis)?;
         let what = outcome.map_or_else(|| "no gait".to_owned(), |value| shown.in_words(value));
         let name = format!("trial {}: {what}", trial.number);
         Ok(DrawnTrial { trial, outcome, link: PointLink { address: format!("/trials/{}", trial.id), name } })
@@ -74,8 +74,8 @@ fn drawn<'a>(snapshot: &'a StudySnapshot, belief: &Belief) -> Result<Vec<DrawnTr
 ///
 /// # Errors
 /// Errors of the learner.
-pub(crate) fn parallel(snapshot: &StudySnapshot, belief: &Belief) -> Result<Option<Figure>, LearnerError> {
-    let (space, shown) = (belief.posterior.space(), TrialMeasure::of(snapshot));
+pub(crate) fn parallel(snapshot: &StudySnapshot, analysis: &Analysis) -> Result<Option<Figure>, LearnerError> {
+    let (space, shown) = (analysis.posterior.space(), TrialMeasure::of(snapshot));
     let axes = space.dimensions().iter().map(|dimension| ParallelAxis {
         name: dimension.name.clone(),
         meaning: meaning(&dimension.name).to_owned(),
@@ -85,7 +85,7 @@ pub(crate) fn parallel(snapshot: &StudySnapshot, belief: &Belief) -> Result<Opti
         let levels = space.levels(space.check(drawn.trial.action_index)?);
         Ok(ParallelLine { link: drawn.link, levels, outcome: drawn.outcome })
     };
-    let lines = drawn(snapshot, belief)?.into_iter().map(line).collect::<Result<Vec<_>, LearnerError>>()?;
+    let lines = drawn(snapshot, analysis)?.into_iter().map(line).collect::<Result<Vec<_>, LearnerError>>()?;
     Ok((!lines.is_empty()).then(|| {
         Figure::parallel(Parallel {
             title: "Bounds and outcome of each trial".to_owned(),
@@ -103,13 +103,13 @@ pub(crate) fn parallel(snapshot: &StudySnapshot, belief: &Belief) -> Result<Opti
 /// Errors of the learner.
 pub(crate) fn by_bound(
     snapshot: &StudySnapshot,
-    belief: &Belief,
+    analysis: &Analysis,
     dimension: usize,
 ) -> Result<Option<Figure>, LearnerError> {
-    let (space, shown) = (belief.posterior.space(), TrialMeasure::of(snapshot));
+    let (space, shown) = (analysis.posterior.space(), TrialMeasure::of(snapshot));
     let Some(bound) = space.dimensions().get(dimension) else { return Ok(None) };
     let mut points = Vec::new();
-    for drawn in drawn(snapshot, belief)? {
+    for drawn in drawn(snapshot, analysis)? {
         let level = space.levels(space.check(drawn.trial.action_index)?)[dimension];
         points.extend(drawn.outcome.map(|outcome| ((bound.values[level], outcome), drawn.link)));
     }

@@ -3,10 +3,10 @@
 use gait_learner::LearnerError;
 use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_compute::OnPool;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::utility_history::UtilityPoint;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 
 /// The chart of a study in which people answer; `None` before the second answer. Not for a large study, whose snapshot has the
 /// newest trials only.
@@ -16,12 +16,12 @@ use gaitwright_store::studies::FeedbackMode;
 pub(crate) fn utility(
     pool: &OnPool,
     snapshot: &StudySnapshot,
-    beliefs: &Beliefs,
+    analyses: &Analyses,
 ) -> Result<Option<Figure>, LearnerError> {
-    if snapshot.study.plan.feedback_mode == FeedbackMode::Automatic {
+    if snapshot.study.plan.answer_source == AnswerSource::GaitRmse {
         return Ok(None);
     }
-    let points = beliefs.utility_history(pool, snapshot)?;
+    let points = analyses.utility_history(pool, snapshot)?;
     Ok((points.len() > 1).then(|| Figure::chart("", chart(&points))))
 }
 

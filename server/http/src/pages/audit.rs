@@ -36,8 +36,8 @@ struct AuditPage {
 
 impl AuditPage {
     /// `lab_session.process` as `lab session: process`.
-    fn words(action: &str) -> String {
-        words(action).replacen('.', ": ", 1)
+    fn words(change: &str) -> String {
+        words(change).replacen('.', ": ", 1)
     }
 
     /// `study 0190...` with only the end of the identifier, which differs most.

@@ -1,56 +1,61 @@
-//! How sure a study is of its recommended gait, as one sentence. It uses the figures of the page *Analysis*.
+//! How sure a study is of its recommended gait, as one sentence. It uses the values of the page *Analysis*.
 
-use crate::format::{figure, percent};
-use gaitwright_service::studies::belief::Belief;
-use gaitwright_service::studies::gait_beliefs::is_distinguishable;
+use crate::format::{decimal, percent};
+use gaitwright_service::studies::analysis::Analysis;
+use gaitwright_service::studies::gait_utilities::is_distinguishable;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::Trial;
 
 /// The sentence about the recommended gait. `None` without a recommendation.
-pub(super) fn certainty(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
+pub(super) fn certainty(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String> {
     if snapshot.waits_for_first_answer() {
         return None;
     }
-    match snapshot.study.plan.feedback_mode {
-        FeedbackMode::Automatic => measured(snapshot, belief),
-        FeedbackMode::Human | FeedbackMode::Mixed => believed(snapshot, belief),
+    match snapshot.study.plan.answer_source {
+        AnswerSource::GaitRmse => by_gait_rmse(snapshot, analysis),
+        AnswerSource::People | AnswerSource::Both => by_utility(snapshot, analysis),
     }
 }
 
-fn measured(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
-    let recommended = snapshot.trial(*belief.gaits.first()?.trials.first()?)?;
+fn by_gait_rmse(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String> {
+    let recommended = snapshot.trial(*analysis.gaits.first()?.trials.first()?)?;
     let own = recommended.gait_rmse_rad?;
-    let others = belief.gaits.iter().skip(1).flat_map(|gait| &gait.trials).filter_map(|id| snapshot.trial(*id));
+    let others = analysis.gaits.iter().skip(1).flat_map(|gait| &gait.trials).filter_map(|id| snapshot.trial(*id));
     let rmse = |trial: &&Trial| trial.gait_rmse_rad.unwrap_or(f64::INFINITY);
     let lowest = others.min_by(|a, b| rmse(a).total_cmp(&rmse(b)));
-    Some(match (lowest, belief.gaits.len()) {
-        (None, _) => "Its Gait RMSE is computed, not estimated. It is the only gait so far.".to_owned(),
+    Some(match (lowest, analysis.gaits.len()) {
+        (None, _) => {
+            "The recommended gait is the only gait so far. Its Gait RMSE is computed, not estimated.".to_owned()
+        }
         (Some(other), _) if rmse(&other) < own => format!(
-            "Trial {} has a lower Gait RMSE, {} rad. The learner recommends by estimated utility, which also draws on gaits \
-             with similar bounds.",
+            "Trial {} has a lower Gait RMSE, {} rad. The learner recommends the gait with the highest estimated utility. \
+             The estimate also uses gaits with similar bounds.",
             other.number,
-            figure(other.gait_rmse_rad)
+            decimal(other.gait_rmse_rad)
         ),
         (Some(_), gaits) => {
-            format!("Its Gait RMSE is computed, not estimated: it is the lowest of {gaits} different gaits.")
+            format!(
+                "The recommended gait has the lowest Gait RMSE of {gaits} different gaits. This is computed from the \
+                 gaits, not estimated."
+            )
         }
     })
 }
 
-fn believed(snapshot: &StudySnapshot, belief: &Belief) -> Option<String> {
-    belief.gaits.first()?;
-    let comparisons = match belief.agreement.comparisons + belief.agreement.ties {
+fn by_utility(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String> {
+    analysis.gaits.first()?;
+    let comparisons = match analysis.agreement.comparisons + analysis.agreement.no_difference {
         1 => "1 comparison".to_owned(),
         all => format!("{all} comparisons"),
     };
-    let Some(next) = belief.gaits.get(1) else {
-        return Some("It is the only gait that can be recommended, so there is nothing to compare it with.".to_owned());
+    let Some(next) = analysis.gaits.get(1) else {
+        return Some("Only one gait can be recommended, so there is nothing to compare it with.".to_owned());
     };
     let (difference, number) = (next.behind?, snapshot.trial(*next.trials.first()?)?.number);
     // Without a line break before the sign.
     let sure = percent(difference.probability_above_zero()).replace(' ', "\u{a0}");
-    let gaits = belief.gaits.len();
+    let gaits = analysis.gaits.len();
     Some(if is_distinguishable(&difference) {
         format!(
             "After {comparisons}, the learner is {sure} sure that this gait is better than that of trial {number}, the \

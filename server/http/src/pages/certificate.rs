@@ -21,56 +21,56 @@ pub(super) struct InWords {
     /// Why it failed.
     pub(super) failures: Vec<String>,
     /// Figures of the closed loop: label and value.
-    pub(super) figures: Vec<(&'static str, String)>,
+    pub(super) values: Vec<(&'static str, String)>,
     /// Every check.
     pub(super) checks: Vec<FormattedCheck>,
 }
 
 impl InWords {
     pub(super) fn new(certificate: Certificate) -> Self {
-        let mut figures = Vec::new();
+        let mut values = Vec::new();
         if let Some(certified) = &certificate.certified {
-            figures.push(("Gait (SHA-256)", certified.gait_sha256.clone()));
-            figures.push(("Subject and device", certified.walker_in_words()));
+            values.push(("Gait (SHA-256)", certified.gait_sha256.clone()));
+            values.push(("Subject and device", certified.walker_in_words()));
             let differences: Vec<String> = certified.differences.iter().map(Difference::in_words).collect();
             let words = if differences.is_empty() { "none".to_owned() } else { differences.join("; ") };
-            figures.push(("Differences from the built-in device and the default settings", words));
+            values.push(("Differences from the built-in device and the default settings", words));
             let cost = format::number(certified.unsmoothed_cost_of_transport);
-            figures.push(("Cost of transport from absolute joint powers, not smoothed", cost));
+            values.push(("Cost of transport from absolute joint powers, not smoothed", cost));
         }
         if let Some(map) = &certificate.return_map {
-            figures.push(("Largest Poincaré multiplier", format::number(map.largest)));
+            values.push(("Largest Poincaré multiplier", format::number(map.largest)));
             let (found, resolved) =
                 (format::number(map.largest_by_differences), format::number(map.differences_resolve));
-            figures.push((
+            values.push((
                 "Largest Poincaré multiplier from finite differences (resolution)",
                 format!("{found} ({resolved})"),
             ));
             let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
-            figures.push((
+            values.push((
                 "Change in speed: share that remains after one stride, share that spreads to other coordinates",
                 format!("{kept}, {leak}"),
             ));
             let distance = format::number(map.fixed_point_distance);
-            figures.push(("Largest deviation of the gait from the periodic motion, rad or rad/s", distance));
+            values.push(("Largest deviation of the gait from the periodic motion, rad or rad/s", distance));
         }
         if let Some(free) = &certificate.free_hip_return_map {
             let words = format!("{:.3} (finite differences: {:.3})", free.largest, free.largest_by_differences);
-            figures.push(("Multiplier of the zero dynamics (free hip velocity)", words));
+            values.push(("Multiplier of the zero dynamics (free hip velocity)", words));
         }
         if let Some(pushes) = certificate.pushes {
             let words = format!(
                 "{:.2} m/s forwards, {:.2} m/s backwards, within {RECOVERY_STRIDES} strides",
                 pushes.forwards_m_s, pushes.backwards_m_s
             );
-            figures.push(("Pushes at the hip from which the walker recovers", words));
+            values.push(("Pushes at the hip from which the walker recovers", words));
         }
         let checks = certificate.checks.into_iter().map(FormattedCheck::new).collect();
-        Self { passed: certificate.passed, failures: certificate.failures, figures, checks }
+        Self { passed: certificate.passed, failures: certificate.failures, values, checks }
     }
 }
 
-/// A check with formatted figures.
+/// A check with formatted values.
 pub(super) struct FormattedCheck {
     pub(super) name: String,
     pub(super) value: String,

@@ -22,8 +22,8 @@ use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::answer;
-use gaitwright_service::studies::pending_comparison::{Question, awaited_question};
+use gaitwright_service::studies::pair_answer;
+use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::studies::walkable;
@@ -216,13 +216,13 @@ async fn show(
         };
     drop(reader);
     let ask = move |pool: &OnPool| {
-        let question = if large { Ok(Question::None) } else { awaited_question(pool, &snapshot) };
-        (snapshot, question)
+        let pending = if large { Ok(PendingComparison::None) } else { awaited_comparison(pool, &snapshot) };
+        (snapshot, pending)
     };
-    let (snapshot, question) = app.compute(ask).await.map_err(Error::from)?;
-    let question = question.map_err(Error::Learner)?.trials();
+    let (snapshot, pending) = app.compute(ask).await.map_err(Error::from)?;
+    let pending = pending.map_err(Error::Learner)?.trials();
     let mut reader = app.read().await?;
-    let waits = question.is_some();
+    let waits = pending.is_some();
     let mut being_certified = 0;
     for trial in
         snapshot.trials.iter().rev().filter(|trial| snapshot.waits_for_certificate(trial)).take(CERTIFIED_AT_ONCE)
@@ -241,7 +241,7 @@ async fn show(
         walkable::admit_pair(&mut reader, id, ("a", "b"), (a, b)).await?;
     }
     let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
-    let (a, b) = match (choice.a, choice.b, question) {
+    let (a, b) = match (choice.a, choice.b, pending) {
         (Some(a), Some(b), _) => (Some(a), Some(b)),
         (_, _, Some((new, old))) => (Some(old), Some(new)),
         _ => (newest(2), newest(1)),
@@ -303,7 +303,7 @@ async fn read_back(
                 return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
             }
             let in_words = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
-            let other_answers = answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
+            let other_answers = pair_answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
             answer_in_words(&row, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,
@@ -391,7 +391,7 @@ fn given(content: &FeedbackContent) -> &'static str {
     match content {
         FeedbackContent::Preference { winner, loser } if winner < loser => "a",
         FeedbackContent::Preference { .. } => "b",
-        FeedbackContent::Tie { .. } => "no_difference",
+        FeedbackContent::NoDifference { .. } => "no_difference",
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => "",
     }
 }
@@ -399,9 +399,8 @@ fn given(content: &FeedbackContent) -> &'static str {
 /// The two trials of an answer, the earlier one first, so that the order does not repeat the answer.
 fn compared(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     match *content {
-        FeedbackContent::Preference { winner: one, loser: other } | FeedbackContent::Tie { a: one, b: other } => {
-            Some((one.min(other), one.max(other)))
-        }
+        FeedbackContent::Preference { winner: one, loser: other }
+        | FeedbackContent::NoDifference { a: one, b: other } => Some((one.min(other), one.max(other))),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }

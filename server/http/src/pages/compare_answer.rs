@@ -10,8 +10,8 @@ use axum::response::Redirect;
 use gaitwright_service::access::{self, Caller};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
-use gaitwright_service::studies::answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::assessment::{self, NewAssessment};
+use gaitwright_service::studies::pair_answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::preference::{self, CurrentAnswer};
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_store::assessments::AssessmentAnswer;
@@ -192,7 +192,9 @@ pub(super) async fn give(
         return Ok(AnswerOutcome::AnsweredBefore(saved));
     }
     let saved = match given {
-        GivenAnswer::Preference(answer) => Recorded::Preference(answer::give(&mut writer, caller, id, &answer).await?),
+        GivenAnswer::Preference(answer) => {
+            Recorded::Preference(pair_answer::give(&mut writer, caller, id, &answer).await?)
+        }
         GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };
     if !is_reviewed {
@@ -228,7 +230,7 @@ async fn retract_recorded(
 ) -> Result<(), Error> {
     match recorded {
         Recorded::Preference(given) => {
-            answer::retract(writer, caller, Some(study), given, Some(author), reason).await?;
+            pair_answer::retract(writer, caller, Some(study), given, Some(author), reason).await?;
         }
         Recorded::Assessment(made) => {
             assessment::retract(writer, caller, Some(study), made, (Some(author), reason)).await?;

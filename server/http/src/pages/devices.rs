@@ -12,7 +12,7 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::{Device as Definition, DeviceField};
-use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::device;
 use gaitwright_store::devices::{self, Device};

@@ -14,7 +14,7 @@ use gait_optimizer::{TunedBounds, Violation};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
-use gaitwright_service::studies::relaxed_trial::{self, NoRelaxedTrial, Relaxation, RelaxedTrial};
+use gaitwright_service::studies::relaxed_trial::{self, NoRelaxedTrial, RelaxedBounds, RelaxedTrial};
 use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
@@ -109,7 +109,7 @@ impl FeasibleRelaxation {
         Ok(relaxations)
     }
 
-    fn of(relaxation: &Relaxation, possible: Result<RelaxedTrial, NoRelaxedTrial>) -> Self {
+    fn of(relaxation: &RelaxedBounds, possible: Result<RelaxedTrial, NoRelaxedTrial>) -> Self {
         let label = |(bound, value): &(String, f64)| quantity(bound, *value);
         let relax = |(bound, value): &(String, f64)| format!("{bound}={value}");
         let offer = |trial: RelaxedTrial| RelaxedTrialOffer {
@@ -149,8 +149,8 @@ pub(super) async fn try_relaxed(
     Form(form): Form<ChosenRelaxation>,
 ) -> Result<Redirect, PageError> {
     for _ in 0..MOST_TRIES {
-        let beliefs = Arc::clone(&app.beliefs);
-        let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &beliefs).await?;
+        let analyses = Arc::clone(&app.analyses);
+        let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &analyses).await?;
         let mut writer = app.write().await?;
         if let Some(trial) = relaxed_trial::queue(&mut writer, &authorized.caller.actor, &chosen).await? {
             commit(writer).await?;

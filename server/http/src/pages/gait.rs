@@ -18,9 +18,9 @@ use askama::Template;
 use axum::extract::State;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
-use gaitwright_charts::{Figure, Ghost, WalkerFigure, gait_charts};
+use gaitwright_charts::{Figure, GaitWalker, Ghost, gait_charts};
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Answer, Permission, Read, Run};
+use gaitwright_service::access::{Answer, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
@@ -41,7 +41,7 @@ struct GaitPage {
     cost: String,
     seconds: String,
     violation: String,
-    figures: Vec<(&'static str, String)>,
+    values: Vec<(&'static str, String)>,
     from: Option<(TrialId, u32)>,
     /// Name of the reference gait.
     reference: String,
@@ -157,7 +157,7 @@ pub(super) async fn get(
     let drawn = move |pool: &OnPool| {
         let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
         let (gait, iterations) = gait.transpose()?.unzip();
-        // Charts show what they can of a malformed gait; figures of it would be false.
+        // Charts show what they can of a malformed gait; values of it would be false.
         let well_formed = gait.as_ref().filter(|gait| converged && gait.validate().is_ok());
         let summary = well_formed.map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
         let sensitivities = solution.map(|solution| SensitivityTable::new(solution, pool));
@@ -167,11 +167,11 @@ pub(super) async fn get(
     let (drawn, summary, sensitivities) = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
         state: words(trial.state.as_str()),
-        rmse: format::figure(trial.gait_rmse_rad),
-        cost: format::figure(trial.cost_of_transport),
+        rmse: format::decimal(trial.gait_rmse_rad),
+        cost: format::decimal(trial.cost_of_transport),
         seconds: format::seconds(trial.seconds_total),
         violation: format::optional_number(trial.max_violation),
-        figures: figures(&trial),
+        values: values(&trial),
         bounds: drawn.bounds,
         no_gait: NoGait::new(&trial, explained, ways, &effort, last_event),
         from,
@@ -242,7 +242,7 @@ fn draw(
         }
     };
     let walker = |gait: &Gait| {
-        let figure = WalkerFigure::new(gait)?.with_ghost(Ghost::of_reference(gait, reference)?);
+        let figure = GaitWalker::new(gait)?.with_ghost(Ghost::of_reference(gait, reference)?);
         let svg = figure.svg("A person walking one stride");
         Ok::<_, Error>(PageChart { svg, ..drawn(&gait_charts::animation(figure)) })
     };
@@ -258,7 +258,7 @@ fn draw(
     })
 }
 
-fn figures(trial: &Trial) -> Vec<(&'static str, String)> {
+fn values(trial: &Trial) -> Vec<(&'static str, String)> {
     let Some(r) = &trial.report else { return Vec::new() };
     vec![
         ("Hip velocity in the four intervals between impacts, m/s", r.vhip_m_s.map(|v| format!("{v:.3}")).join(", ")),

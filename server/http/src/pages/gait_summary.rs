@@ -55,10 +55,10 @@ impl ReferenceRow {
     fn new(comparison: ReferenceComparison) -> Self {
         Self {
             of_the_study: comparison.of_the_problem,
-            rmse: format::figure(Some(comparison.gait_rmse_rad)),
+            rmse: format::decimal(Some(comparison.gait_rmse_rad)),
             aligned: format!(
                 "{} ({} %)",
-                format::figure(Some(comparison.aligned_gait_rmse_rad)),
+                format::decimal(Some(comparison.aligned_gait_rmse_rad)),
                 format::number(comparison.shift_percent)
             ),
             parts: comparison.parts_deg.iter().map(|part| format!("{part:.1}")).collect(),

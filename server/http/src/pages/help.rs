@@ -18,13 +18,14 @@ use rust_embed::Embed;
 struct Guides;
 
 /// The guides in the order of the table of contents: name in addresses, title, and file in the repository.
-const GUIDES: [(&str, &str, &str); 14] = [
+const GUIDES: [(&str, &str, &str); 15] = [
     ("clinician", "Guide for clinicians", "docs/clinician.md"),
     ("rater", "Guide for raters", "docs/rater.md"),
     ("lab-session", "Guide for lab sessions", "docs/lab-session.md"),
     ("lab-script", "Guide for lab scripts", "docs/lab-script.md"),
     ("unattended", "Guide for unattended runs", "docs/unattended.md"),
     ("administrator", "Guide for administrators", "docs/administrator.md"),
+    ("developer", "Guide for developers", "docs/developer.md"),
     ("data-files", "Data files", DATA_FILES),
     ("method", "Method", "docs/method.md"),
     ("learner", "Learner", LEARNER),
@@ -49,7 +50,7 @@ struct Help {
     title: String,
     /// HTML made from a guide; empty for the table of contents.
     guide: String,
-    guides: [(&'static str, &'static str, &'static str); 14],
+    guides: [(&'static str, &'static str, &'static str); 15],
 }
 
 /// `GET /help`.

@@ -10,7 +10,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_charts::sparkline;
-use gaitwright_service::access::{Permission, Rate, Read, Run, sign_in};
+use gaitwright_service::access::{Rate, Read, RequiredRight, Run, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::{lifecycle, safety_reports};
 use gaitwright_store::studies::{Study, StudyFilter, StudyState};

@@ -19,14 +19,14 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::emg::{CycleActivity, EmgSettings};
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, Condition, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkView,
+    self, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkCondition, WalkView,
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trials_table::ListedTrial;
+use gaitwright_store::trial_query::ListedTrial;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 
@@ -93,7 +93,7 @@ async fn show_list(
     let gaits = lab::gaits_to_plan_with(&mut reader, id, OFFERED).await?;
     drop(reader);
     let named = |trial: ListedTrial| {
-        (trial.id, format!("trial {} (Gait RMSE {} rad)", trial.number, format::figure(trial.gait_rmse_rad)))
+        (trial.id, format!("trial {} (Gait RMSE {} rad)", trial.number, format::decimal(trial.gait_rmse_rad)))
     };
     let shown = |session| {
         let view = LabSessionView::from(&session);
@@ -191,12 +191,12 @@ impl MeasuredActivity {
         let compared: Vec<_> = walks().filter_map(|walk| Some((walk, walk.emg_rmse.as_ref()?))).collect();
         let channels = emg.result.walks.first().map_or(&[][..], |walk| &walk.channels);
         let row = |(place, channel): (usize, &CycleActivity)| {
-            let rmse = compared.iter().map(|(_, rmse)| format::figure(rmse.parts.get(place).copied()));
-            let averages = walks().map(|walk| format::figure(walk.averages.get(place).copied()));
+            let rmse = compared.iter().map(|(_, rmse)| format::decimal(rmse.parts.get(place).copied()));
+            let averages = walks().map(|walk| format::decimal(walk.averages.get(place).copied()));
             (lab_charts::muscle_name(&channel.channel).to_owned(), rmse.collect(), averages.collect())
         };
         let mut rows: Vec<(String, Vec<String>, Vec<String>)> = channels.iter().enumerate().map(row).collect();
-        let totals = compared.iter().map(|(_, rmse)| format::figure(Some(rmse.total))).collect();
+        let totals = compared.iter().map(|(_, rmse)| format::decimal(Some(rmse.total))).collect();
         rows.push(("sum of all muscles".to_owned(), totals, walks().map(|_| String::new()).collect()));
         let model = emg.model.iter().flat_map(|walk| {
             walk.muscles.iter().map(|muscle| {
@@ -204,7 +204,7 @@ impl MeasuredActivity {
                     lab_charts::walk_name(session, walk.walk),
                     lab_charts::muscle_name(&muscle.channel).to_owned(),
                     muscle.muscle.clone(),
-                    format::figure(Some(muscle.rms_difference)),
+                    format::decimal(Some(muscle.rms_difference)),
                     muscle.correlation.map_or_else(|| "–".to_owned(), format::signed),
                 ]
             })
@@ -306,12 +306,12 @@ pub(super) async fn show(
     })
 }
 
-fn in_words(condition: Option<Condition>) -> &'static str {
+fn in_words(condition: Option<WalkCondition>) -> &'static str {
     match condition {
         None => "one of the two gaits (blinded)",
-        Some(Condition::Normal) => "without the device",
-        Some(Condition::GaitA) => "gait A",
-        Some(Condition::GaitB) => "gait B",
+        Some(WalkCondition::Normal) => "without the device",
+        Some(WalkCondition::GaitA) => "gait A",
+        Some(WalkCondition::GaitB) => "gait B",
     }
 }
 

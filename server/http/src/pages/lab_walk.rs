@@ -11,7 +11,7 @@ use crate::problem_details::Problem;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Permission, Rate, Read};
+use gaitwright_service::access::{Rate, Read, RequiredRight};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, LabSessionProgress, NewAnswer, RecordedWalk};
 use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members, now};

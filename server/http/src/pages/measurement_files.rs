@@ -1,7 +1,7 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
 use super::lab;
-use super::measurement_forms::{EmgFields, FilterFields, Forms, MeasurementPreview, MotionFields};
+use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields, MeasurementPreview};
 use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
@@ -44,20 +44,26 @@ pub(super) async fn emg(
     lab::answer(&mut app, id, &authorized.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
 }
 
-/// `POST /lab-sessions/{id}/measurement-files/motion`.
-pub(super) async fn motion(
+/// `POST /lab-sessions/{id}/measurement-files/joint-angles`.
+pub(super) async fn joint_angles(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
     Id(id, _): Id<LabSessionId, Run>,
-    Form(fields): Form<MotionFields>,
+    Form(fields): Form<JointAngleFields>,
 ) -> Result<Response, PageError> {
     let kept = async {
         let checked = fields.read()?.checked(app.store_mut()).await?;
         keep(&app, &authorized, id, checked).await
     };
     let kept = kept.await;
-    lab::answer(&mut app, id, &authorized.caller, kept, Forms { motion: fields, open: "motion", ..Forms::default() })
-        .await
+    lab::answer(
+        &mut app,
+        id,
+        &authorized.caller,
+        kept,
+        Forms { joint_angles: fields, open: "joint_angles", ..Forms::default() },
+    )
+    .await
 }
 
 /// Reads and draws the file of the form on the thread pool. Nothing is stored.

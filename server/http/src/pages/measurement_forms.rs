@@ -3,7 +3,9 @@
 use super::page_chart::PageChart;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, Stride};
+use gaitwright_service::studies::lab::{
+    EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles, Stride,
+};
 use gaitwright_service::studies::reference_import::Unit;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -153,7 +155,7 @@ fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {
 /// The form for joint angles, as typed.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct MotionFields {
+pub(super) struct JointAngleFields {
     pub(super) walk: u8,
     pub(super) format: MeasurementFormat,
     pub(super) recording: String,
@@ -162,25 +164,25 @@ pub(super) struct MotionFields {
     pub(super) file_name: String,
 }
 
-impl Default for MotionFields {
+impl Default for JointAngleFields {
     fn default() -> Self {
-        let MotionReading { format, cutoff_hz, .. } = MotionReading::default();
+        let JointAngleReading { format, cutoff_hz, .. } = JointAngleReading::default();
         let (recording, unit) = (String::new(), String::new());
         Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string(), file_name: String::new() }
     }
 }
 
-impl MotionFields {
-    pub(super) fn read(&self) -> Result<NewMotion, Error> {
+impl JointAngleFields {
+    pub(super) fn read(&self) -> Result<NewJointAngles, Error> {
         let unit = match self.unit.as_str() {
             "" => None,
             "degrees" => Some(Unit::Degrees),
             "radians" => Some(Unit::Radians),
             other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
         };
-        let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(MotionReading::default().cutoff_hz);
-        let reading = MotionReading { format: self.format, unit, cutoff_hz, file_name: file_name(&self.file_name) };
-        Ok(NewMotion { walk: self.walk, recording: self.recording.clone(), reading })
+        let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(JointAngleReading::default().cutoff_hz);
+        let reading = JointAngleReading { format: self.format, unit, cutoff_hz, file_name: file_name(&self.file_name) };
+        Ok(NewJointAngles { walk: self.walk, recording: self.recording.clone(), reading })
     }
 }
 
@@ -220,10 +222,10 @@ impl From<EmgSettings> for FilterFields {
 #[derive(Debug, Default)]
 pub(super) struct Forms {
     pub(super) emg: EmgFields,
-    pub(super) motion: MotionFields,
+    pub(super) joint_angles: JointAngleFields,
     /// `None` for the settings of the last processing.
     pub(super) filters: Option<FilterFields>,
-    /// The refused form: `emg`, `motion` or `filters`.
+    /// The refused form: `emg`, `joint_angles` or `filters`.
     pub(super) open: &'static str,
     /// The preview of the EMG recording in the form.
     pub(super) preview: Option<MeasurementPreview>,

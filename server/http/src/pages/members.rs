@@ -15,7 +15,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Administer, Caller, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterReliability, Share};
 use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};

@@ -1,9 +1,9 @@
 //! HTML pages, rendered on the server and usable without scripts.
 
 mod access_log;
+mod analysis;
 mod api_reference;
 mod audit;
-mod belief;
 mod certainty;
 mod certificate;
 mod compare;
@@ -23,7 +23,7 @@ mod lab_walk;
 mod measurement_files;
 mod measurement_forms;
 mod members;
-mod muscles;
+mod muscle_form;
 mod new_study;
 mod page_chart;
 mod problem_types;
@@ -42,7 +42,7 @@ mod subject;
 mod subjects;
 mod system;
 mod undo;
-mod units;
+mod unit_choice;
 mod unsent_form;
 mod users;
 mod walking_pair;
@@ -62,7 +62,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/compare", get(study_comparison::get))
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
-        .route("/studies/{id}/belief", get(belief::get))
+        .route("/studies/{id}/analysis", get(analysis::get))
         .route("/studies/{id}/figures", get(figures::get))
         .route("/studies/{id}/details", get(study_details::get).post(study_details::post))
         .route("/studies/{id}/do", post(study::post))
@@ -74,7 +74,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/subjects/{id}/consent", post(subject::consent))
         .route("/subjects/{id}/withdraw", post(subject::withdraw))
         .route("/subjects/{id}/correct", post(subject::correct))
-        .route("/subjects/{id}/muscles", get(muscles::get).post(muscles::post))
+        .route("/subjects/{id}/muscles", get(muscle_form::get).post(muscle_form::post))
         .route("/devices", get(devices::list))
         .route("/devices/{id}", get(devices::get).post(devices::post))
         .route("/trials/{id}", get(gait::get))
@@ -82,28 +82,28 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
         .route("/trials/{id}/relaxed-trial", post(explanation::try_relaxed))
-        .route("/trials/{id}/simulate", post(simulated_walks::post))
+        .route("/trials/{id}/execution-report", post(simulated_walks::post))
         .route("/trials/{id}/safety-report", post(safety_review::report))
         .route("/trials/{id}/safety-review", post(safety_review::post))
         .route("/reference-gaits", get(reference_gaits::list).post(reference_gaits::import))
         .route("/reference-gaits/{id}", get(reference_gaits::get))
         .route("/rate", get(rate::list))
         .route("/rate/{id}", post(rate::next))
-        .route("/rate/pair/{token}", get(rate::pair).post(rate::answer))
-        .route("/rate/pair/{token}/retract", post(rate::retract))
+        .route("/rate/pair/{code}", get(rate::pair).post(rate::answer))
+        .route("/rate/pair/{code}/retract", post(rate::retract))
         .route("/studies/{id}/lab", get(lab::list).post(lab::plan))
         .route("/lab-sessions/{id}", get(lab::get))
         .route("/lab-sessions/{id}/close", post(lab::close))
         .route("/lab-sessions/{id}/unblind", post(lab::unblind))
         .route("/lab-sessions/{id}/measurement-files/emg", post(measurement_files::emg))
-        .route("/lab-sessions/{id}/measurement-files/motion", post(measurement_files::motion))
+        .route("/lab-sessions/{id}/measurement-files/joint-angles", post(measurement_files::joint_angles))
         .route("/lab-sessions/{id}/process", post(measurement_files::process))
         .route("/lab", get(lab_walk::list))
         .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
         .route("/lab/{id}/answer", post(lab_walk::answer))
         .route("/lab/{id}/retract", post(lab_walk::retract))
         .route("/jobs/{id}/cancel", post(jobs::cancel))
-        .route("/units", post(units::post))
+        .route("/units", post(unit_choice::post))
         .route("/users", get(users::get).post(users::post))
         .route("/audit", get(audit::get))
         .route("/access-log", get(access_log::get))

@@ -19,7 +19,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::PairWithSides;
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
-use gaitwright_store::studies::{FeedbackMode, StudyFilter};
+use gaitwright_store::studies::{AnswerSource, StudyFilter};
 use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
 use serde::Deserialize;
 
@@ -70,7 +70,7 @@ const READ_S: u32 = 2;
 /// An answer, read from the record.
 struct SavedBlindAnswer {
     study: StudyId,
-    token: String,
+    code: String,
     number: u32,
     answer: OrderedAnswer,
     at: Instant,
@@ -91,7 +91,7 @@ impl SavedBlindAnswer {
 #[derive(Template)]
 #[template(path = "rate_pair.html")]
 struct PairPage {
-    token: String,
+    code: String,
     number: u32,
     /// Whether the caller may read the study, and so could know which gait is which.
     not_blind: bool,
@@ -147,8 +147,8 @@ pub(super) async fn list(
     let mut reader = app.read().await?;
     let is_answer = before.saved.is_some();
     let saved = match before.saved {
-        Some(token) => {
-            let shown = blind::own(&mut reader, &authorized.caller, &token).await?;
+        Some(code) => {
+            let shown = blind::own(&mut reader, &authorized.caller, &code).await?;
             read_back(&mut reader, shown).await?
         }
         None => newest(&mut reader, &authorized.caller).await?,
@@ -186,14 +186,14 @@ pub(super) async fn list(
 async fn newest(db: &mut Connection, caller: &Caller) -> Result<Option<SavedBlindAnswer>, Error> {
     let mut newest: Option<BlindPair> = None;
     for study in studies::page(db, caller.reach(), &StudyFilter::newest(SEARCHED)).await? {
-        if study.plan.feedback_mode == FeedbackMode::Automatic || consents::is_withdrawn(db, study.id).await? {
+        if study.plan.answer_source == AnswerSource::GaitRmse || consents::is_withdrawn(db, study.id).await? {
             continue;
         }
         let own = blind_pairs::of_study(db, study.id).await?.into_iter().filter(|shown| shown.rater == caller.name);
         newest = newest.into_iter().chain(own).max_by_key(|shown| shown.answered_at);
     }
     let Some(shown) = newest else { return Ok(None) };
-    let shown = match blind::own(db, caller, &shown.token).await {
+    let shown = match blind::own(db, caller, &shown.code).await {
         // The record does not have the sides of an imported pair.
         Err(Error::NotFound { .. }) => return Ok(None),
         shown => shown?,
@@ -208,7 +208,7 @@ async fn read_back(db: &mut Connection, shown: PairWithSides) -> Result<Option<S
         answer,
         at,
         number: shown.pair.number,
-        token: shown.pair.token,
+        code: shown.pair.code,
         can_be_retracted,
     }))
 }
@@ -222,31 +222,31 @@ pub(super) async fn next(
     let (writer, next) = blind::next(app.store_mut(), &authorized.caller, id).await?;
     commit(writer).await?;
     Ok(match next {
-        Some(next) => Redirect::to(&format!("/rate/pair/{}", next.shown.pair.token)),
+        Some(next) => Redirect::to(&format!("/rate/pair/{}", next.shown.pair.code)),
         None => Redirect::to(&format!("/rate?nothing=true&study={id}")),
     })
 }
 
-/// `GET /rate/pair/{token}`.
+/// `GET /rate/pair/{code}`.
 pub(super) async fn pair(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path(token): Path<String>,
+    Path(code): Path<String>,
 ) -> PageResult {
-    show(&mut app, &authorized.caller, &token, None).await
+    show(&mut app, &authorized.caller, &code, None).await
 }
 
-async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<String>) -> PageResult {
+async fn show(app: &mut AppState, caller: &Caller, code: &str, refused: Option<String>) -> PageResult {
     let mut reader = app.read().await?;
-    let shown = blind::own(&mut reader, caller, token).await?;
-    let (token, number) = (shown.pair.token.clone(), shown.pair.number);
+    let shown = blind::own(&mut reader, caller, code).await?;
+    let (code, number) = (shown.pair.code.clone(), shown.pair.number);
     let not_blind =
         shown.pair.could_have_known || blind::could_have_known(&mut reader, caller, shown.pair.study_id).await?;
     if shown.pair.answer.is_some() {
         let saved = read_back(&mut reader, shown).await?;
-        return page(&PairPage { token, number, not_blind, saved, refused, strides: None });
+        return page(&PairPage { code, number, not_blind, saved, refused, strides: None });
     }
-    blind::own_showable_pair(&mut reader, caller, &token).await?;
+    blind::own_showable_pair(&mut reader, caller, &code).await?;
     let mut pair = Vec::new();
     let (first, second) = shown.shown();
     for trial in [first, second] {
@@ -254,7 +254,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
         pair.extend(gaits::get(&mut reader, trial).await.ok());
     }
     drop(reader);
-    let phase = phase(&token);
+    let phase = phase(&code);
     let strides = app.compute(move |pool| {
         let stride = |gait: &Packed<Gait>| {
             let figures = blind_stride(&gait.unpack(pool).ok()?, phase).ok()?;
@@ -266,7 +266,7 @@ async fn show(app: &mut AppState, caller: &Caller, token: &str, refused: Option<
         }
     });
     let strides = strides.await.map_err(Error::from)?;
-    page(&PairPage { token, number, not_blind, saved: None, refused, strides })
+    page(&PairPage { code, number, not_blind, saved: None, refused, strides })
 }
 
 /// The form of a pair.
@@ -279,44 +279,44 @@ pub(super) struct PairForm {
     response_ms: String,
 }
 
-/// `POST /rate/pair/{token}`.
+/// `POST /rate/pair/{code}`.
 pub(super) async fn answer(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path(token): Path<String>,
+    Path(code): Path<String>,
     Form(form): Form<PairForm>,
 ) -> Result<Response, PageError> {
     let given = RaterAnswer { answer: form.answer, response_ms: form.response_ms.trim().parse().ok(), note: form.note };
     let answered = async {
         let mut writer = app.write().await?;
         // A form that is sent twice (double click, lost response) counts as one answer.
-        let before = blind::own(&mut writer, &authorized.caller, &token).await?.answer();
+        let before = blind::own(&mut writer, &authorized.caller, &code).await?.answer();
         if before != Some(given.answer) || given.answer.is_about_safety() {
-            blind::answer(&mut writer, &authorized.caller, &token, &given).await?;
+            blind::answer(&mut writer, &authorized.caller, &code, &given).await?;
             commit(writer).await?;
             app.scheduler.changed();
         }
         Ok(before.is_some() && given.answer.is_about_safety())
     };
     let answered = answered.await;
-    redirected(&mut app, &authorized.caller, &token, answered).await
+    redirected(&mut app, &authorized.caller, &code, answered).await
 }
 
-/// `POST /rate/pair/{token}/retract`.
+/// `POST /rate/pair/{code}/retract`.
 pub(super) async fn retract(
     authorized: Authorized<Rate>,
     State(mut app): State<AppState>,
-    Path(token): Path<String>,
+    Path(code): Path<String>,
 ) -> Result<Response, PageError> {
     let retracted = async {
         let mut writer = app.write().await?;
-        blind::retract(&mut writer, &authorized.caller, &token).await?;
+        blind::retract(&mut writer, &authorized.caller, &code).await?;
         commit(writer).await?;
         app.scheduler.changed();
         Ok(false)
     };
     let retracted = retracted.await;
-    redirected(&mut app, &authorized.caller, &token, retracted).await
+    redirected(&mut app, &authorized.caller, &code, retracted).await
 }
 
 /// Redirects after an action, which may be a safety report about an answered pair; a conflict is shown on the page of
@@ -324,16 +324,16 @@ pub(super) async fn retract(
 async fn redirected(
     app: &mut AppState,
     caller: &Caller,
-    token: &str,
+    code: &str,
     done: Result<bool, Error>,
 ) -> Result<Response, PageError> {
     match done {
         Ok(reported) => {
             let reported = if reported { "&reported=true" } else { "" };
-            Ok(Redirect::to(&format!("/rate?saved={token}{reported}")).into_response())
+            Ok(Redirect::to(&format!("/rate?saved={code}{reported}")).into_response())
         }
         Err(error @ Error::Conflict(_)) => {
-            let shown = show(app, caller, token, Some(error.to_string())).await?;
+            let shown = show(app, caller, code, Some(error.to_string())).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),

@@ -5,7 +5,7 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form as Submitted, Params};
-use crate::figures::reference;
+use crate::figures::reference_figures;
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
@@ -16,7 +16,7 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::reference::RecordedStride;
 use gaitwright_charts::gait_charts;
-use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};
@@ -108,7 +108,7 @@ struct JointAnglePreview {
 impl JointAnglePreview {
     fn of(new: &NewReferenceGait) -> Result<Self, Error> {
         let preview = new.preview()?;
-        let mut charts: Vec<PageChart> = reference::preview(&preview).iter().map(PageChart::new).collect();
+        let mut charts: Vec<PageChart> = reference_figures::preview(&preview).iter().map(PageChart::new).collect();
         let (mean, refused) = match &preview.reference {
             Ok(found) => (gait_charts::of_reference(found).iter().map(PageChart::new).collect(), None),
             Err(error) => (Vec::new(), Some(form_errors::in_words(error))),
@@ -240,7 +240,7 @@ pub(super) async fn get(
         units,
         warning: reference.definition.warning().map_err(Error::from)?,
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
-        charts: reference::of_reference(&reference.definition)
+        charts: reference_figures::of_reference(&reference.definition)
             .iter()
             .map(|figure| PageChart::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
             .collect(),

@@ -8,13 +8,13 @@ use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
-use gait_optimizer::execution::{ExecutionReport, WalksOnGround};
+use gait_optimizer::execution::{ExecutionReport, SimulatedWalksOnGround};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{MOST_WALKS, NewExecutionReport, Simulation};
 use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
-use gaitwright_store::execution_reports::{GaitSimulated, StoredReport};
+use gaitwright_store::execution_reports::{ExecutionReported, StoredReport};
 use gaitwright_store::{Instant, TrialId, commit};
 use serde::Deserialize;
 
@@ -31,7 +31,7 @@ pub(super) struct ShownReport {
     pub(super) sentence: String,
     pub(super) grounds: Vec<GroundRow>,
     /// Label and value.
-    pub(super) figures: Vec<(&'static str, String)>,
+    pub(super) values: Vec<(&'static str, String)>,
     pub(super) program: String,
     pub(super) created_at: Instant,
 }
@@ -68,25 +68,26 @@ impl SimulatedWalks {
 
 impl ShownReport {
     fn new(kept: StoredReport) -> Self {
-        let StoredReport { simulated: GaitSimulated { walks, seed, program, report, .. }, created_at } = kept;
+        let StoredReport { reported: ExecutionReported { simulated_walks, seed, program, report, .. }, created_at } =
+            kept;
         let of_strides = |strides: u32| format!("{strides} of {}", report.strides);
         let by_yield = report.strides_by_yield.iter();
         let by_yield: Vec<String> = by_yield
             .map(|walk| format!("{} on ground that yields {} mm", walk.strides, format::number(1e3 * walk.yield_m)))
             .collect();
         let [lightest, heaviest] = report.body_mass_kg;
-        let figures = vec![
+        let values = vec![
             ("Strides without any disturbance", of_strides(report.undisturbed_strides)),
             ("Strides on harder and softer ground, otherwise undisturbed", by_yield.join(", ")),
             ("Largest push at the hip survived without other disturbances", pushes(&report)),
             (
-                "Disturbed walks",
-                format!("{walks} on each ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"),
+                "Disturbed simulated walks",
+                format!("{simulated_walks} on each ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"),
             ),
             ("Gait (SHA-256)", report.gait_sha256.clone()),
         ];
         let grounds = report.grounds.iter().map(GroundRow::new).collect();
-        Self { sentence: report.sentence(), grounds, figures, program, created_at }
+        Self { sentence: report.sentence(), grounds, values, program, created_at }
     }
 }
 
@@ -104,12 +105,12 @@ fn pushes(report: &ExecutionReport) -> String {
 }
 
 impl GroundRow {
-    fn new(on: &WalksOnGround) -> Self {
+    fn new(on: &SimulatedWalksOnGround) -> Self {
         let percent = |share: f64| format!("{:.0}", 100.0 * share);
         let [low, high] = on.completed_share_interval;
         Self {
             ground: on.ground_in_words(),
-            complete: format!("{} of {}", on.completed, on.walks),
+            complete: format!("{} of {}", on.completed, on.simulated_walks),
             share: format!("{} ({} to {})", percent(on.completed_share), percent(low), percent(high)),
             strides: format!("{:.1}", on.mean_strides),
             ended: format!("{}, {}", on.fell, on.halted),
@@ -123,23 +124,25 @@ impl GroundRow {
 #[derive(Debug, Deserialize)]
 pub(super) struct WalksFields {
     #[serde(default)]
-    walks: String,
+    simulated_walks: String,
     #[serde(default)]
     seed: String,
 }
 
 impl WalksFields {
     fn request(&self) -> Result<NewExecutionReport, Error> {
-        let walks = self.walks.trim().parse();
+        let walks = self.simulated_walks.trim().parse();
         let seed = self.seed.trim().parse();
         Ok(NewExecutionReport {
-            walks: walks.map_err(|_| Error::invalid("walks", self.walks.as_str(), &format!("1 to {MOST_WALKS}")))?,
+            simulated_walks: walks.map_err(|_| {
+                Error::invalid("simulated_walks", self.simulated_walks.as_str(), &format!("1 to {MOST_WALKS}"))
+            })?,
             seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {LARGEST_SEED}")))?,
         })
     }
 }
 
-/// `POST /trials/{id}/simulate`.
+/// `POST /trials/{id}/execution-report`.
 pub(super) async fn post(
     authorized: Authorized<Run>,
     State(app): State<AppState>,

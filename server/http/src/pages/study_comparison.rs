@@ -16,7 +16,7 @@ use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::studies::{Study, StudyFilter};
 use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
@@ -83,8 +83,8 @@ pub(super) async fn get(
         (Some(a), Some(b)) => {
             let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
             drop(reader);
-            let beliefs = Arc::clone(&app.beliefs);
-            let compared = app.compute(move |pool| compare(pool, a, b, &beliefs)).await.map_err(Error::from)??;
+            let analyses = Arc::clone(&app.analyses);
+            let compared = app.compute(move |pool| compare(pool, a, b, &analyses)).await.map_err(Error::from)??;
             Some(with_best_gaits(&mut app, compared).await?)
         }
         _ => {
@@ -133,20 +133,20 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
         ("Reference gait".to_owned(), study.reference_gait.clone()),
         ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
         ("Device".to_owned(), study.device.clone()),
-        ("Answered by".to_owned(), format::answers_by(plan.feedback_mode).to_owned()),
+        ("Source of answers".to_owned(), format::answer_source(plan.answer_source).to_owned()),
         ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
         ("Seed".to_owned(), plan.seed.to_string()),
-        ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.trial_budget)),
+        ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.number_of_trials)),
         ("Converged".to_owned(), study.counts.converged.to_string()),
         ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
         ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
     ];
     if comparable {
         let rmse = best.and_then(|trial| trial.gait_rmse_rad);
-        rows.push(("Gait RMSE of the best trial, rad".to_owned(), format::figure(rmse)));
+        rows.push(("Gait RMSE of the best trial, rad".to_owned(), format::decimal(rmse)));
     }
     let cost = best.and_then(|trial| trial.cost_of_transport);
-    rows.push(("Cost of transport of the best trial".to_owned(), format::figure(cost)));
+    rows.push(("Cost of transport of the best trial".to_owned(), format::decimal(cost)));
     let bounds = best.map(|trial| trial.action.to_array());
     for (place, name) in TunedBounds::NAMES.iter().enumerate() {
         let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
@@ -159,9 +159,9 @@ fn compare(
     pool: &OnPool,
     a: StudyResults,
     b: StudyResults,
-    beliefs: &Beliefs,
+    analyses: &Analyses,
 ) -> Result<(Compared, [Option<TrialId>; 2]), Error> {
-    let (of_a, of_b) = (a.outcome(pool, beliefs)?, b.outcome(pool, beliefs)?);
+    let (of_a, of_b) = (a.outcome(pool, analyses)?, b.outcome(pool, analyses)?);
     let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
     let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
     let chart = if comparable { course(&both) } else { None };

@@ -12,9 +12,9 @@ use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Caller, Permission, Read, Run};
+use gaitwright_service::access::{Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::study_change::{self, Change};
+use gaitwright_service::studies::study_change::{self, StudyChange};
 use gaitwright_service::studies::study_plan;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{StudyId, Writer, commit, studies};
@@ -64,18 +64,18 @@ impl StudyDetailsFields {
         }
     }
 
-    fn change(&self) -> Result<Change, Error> {
+    fn change(&self) -> Result<StudyChange, Error> {
         let tags = self.tags.split(',').map(str::trim).filter(|tag| !tag.is_empty()).map(str::to_owned);
         Ok(match self.button.as_str() {
-            "save" => Change {
+            "save" => StudyChange {
                 name: Some(self.name.clone()),
                 tags: Some(tags.collect()),
                 // A browser sends line ends as CR LF.
                 notes: Some(self.notes.replace("\r\n", "\n")),
-                ..Change::default()
+                ..StudyChange::default()
             },
-            "archive" => Change { archived: Some(true), ..Change::default() },
-            "restore" => Change { archived: Some(false), ..Change::default() },
+            "archive" => StudyChange { archived: Some(true), ..StudyChange::default() },
+            "restore" => StudyChange { archived: Some(false), ..StudyChange::default() },
             other => return Err(Error::invalid("button", other, "save, archive or restore")),
         })
     }

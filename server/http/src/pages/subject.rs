@@ -13,9 +13,9 @@ use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Administer, Caller, Permission, Reach, Read, Run};
+use gaitwright_service::access::{Administer, Caller, Reach, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::consent::{self, NewConsent, Withdrawal};
+use gaitwright_service::studies::consent::{self, ConsentWithdrawal, NewConsent};
 use gaitwright_service::studies::lab::LabSessionView;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_service::studies::subject::{self, NewCorrection};
@@ -232,7 +232,7 @@ pub(super) async fn withdraw(
     DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     Form(form): Form<Withdrawing>,
 ) -> Result<Response, PageError> {
-    let why = Withdrawal { reason: form.reason };
+    let why = ConsentWithdrawal { reason: form.reason };
     let done = if form.confirmed.as_deref() == Some("yes") {
         end(&app, &authorized, id, &why).await
     } else {
@@ -252,7 +252,12 @@ pub(super) struct Withdrawing {
     confirmed: Option<String>,
 }
 
-async fn end(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, why: &Withdrawal) -> Result<(), Error> {
+async fn end(
+    app: &AppState,
+    authorized: &Authorized<Run>,
+    id: SubjectId,
+    why: &ConsentWithdrawal,
+) -> Result<(), Error> {
     let mut writer = app.write().await?;
     let (_, cancelled) = consent::withdraw(&mut writer, &authorized.caller.actor, id, why).await?;
     commit(writer).await?;

@@ -10,7 +10,7 @@ use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gaitwright_service::access::{Permission, Read, Run};
+use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::subject::{self, NewSubject};
 use gaitwright_store::consents::{self, ConsentKind};

@@ -7,7 +7,7 @@ use crate::page_error::{PageResult, page};
 use crate::readiness;
 use askama::Template;
 use axum::extract::State;
-use gaitwright_service::access::{Administer, Caller, Permission, Read};
+use gaitwright_service::access::{Administer, Caller, Read, RequiredRight};
 use gaitwright_service::backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::job::JobState;

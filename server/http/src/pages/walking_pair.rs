@@ -2,7 +2,7 @@
 
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ModelError};
-use gaitwright_charts::{WalkerFigure, gait_tiles};
+use gaitwright_charts::{GaitWalker, gait_tiles};
 use gaitwright_store::TrialId;
 
 /// One gait of the pair.
@@ -22,9 +22,9 @@ pub(super) struct WalkingGait {
 /// # Errors
 /// [`ModelError`] if subject or device of a gait is invalid.
 pub(super) fn walking_pair([a, b]: [(TrialId, u32, String, &Gait); 2]) -> Result<[WalkingGait; 2], ModelError> {
-    let (walker_a, walker_b) = (WalkerFigure::new(a.3)?, WalkerFigure::new(b.3)?);
+    let (walker_a, walker_b) = (GaitWalker::new(a.3)?, GaitWalker::new(b.3)?);
     let (ghost_a, ghost_b) = (walker_a.as_ghost(), walker_b.as_ghost());
-    let shown = |(trial, number, name, gait): (TrialId, u32, String, &Gait), walker: &WalkerFigure| {
+    let shown = |(trial, number, name, gait): (TrialId, u32, String, &Gait), walker: &GaitWalker| {
         Ok::<_, ModelError>(WalkingGait {
             walker: walker.svg(&format!("{name}, walking")),
             tiles: gait_tiles(&stick_figures(gait)?),

@@ -30,7 +30,7 @@ pub(crate) struct AuditRow {
 
 impl From<audit::AuditRow> for AuditRow {
     fn from(row: audit::AuditRow) -> Self {
-        let audit::AuditRow { seq, at, actor, action, object, detail, previous, hash } = row;
-        Self { seq, created_at: at, actor, change: action, object, detail, previous, hash }
+        let audit::AuditRow { seq, created_at, actor, change, object, detail, previous, hash } = row;
+        Self { seq, created_at, actor, change, object, detail, previous, hash }
     }
 }

@@ -166,7 +166,7 @@ pub(crate) struct ReturnMap {
     /// Largest component of the difference between the gait's initial state and the fixed point, rad and rad/s.
     fixed_point_distance: f64,
     /// Multipliers from variational equations and saltation matrices, largest first.
-    multipliers: Vec<Multiplier>,
+    multipliers: Vec<FloquetMultiplier>,
     /// Largest modulus of the multipliers.
     largest: f64,
     /// Largest modulus of the multipliers, from finite differences of simulated domains.
@@ -208,16 +208,16 @@ impl From<certificate::ReturnMap> for ReturnMap {
 
 /// A Floquet multiplier: an eigenvalue of the linearised stride-to-stride map.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct Multiplier {
+pub(crate) struct FloquetMultiplier {
     /// Real part.
     real: f64,
     /// Imaginary part.
     imaginary: f64,
 }
 
-impl From<certificate::Multiplier> for Multiplier {
-    fn from(multiplier: certificate::Multiplier) -> Self {
-        let certificate::Multiplier { real, imaginary } = multiplier;
+impl From<certificate::FloquetMultiplier> for FloquetMultiplier {
+    fn from(multiplier: certificate::FloquetMultiplier) -> Self {
+        let certificate::FloquetMultiplier { real, imaginary } = multiplier;
         Self { real, imaginary }
     }
 }

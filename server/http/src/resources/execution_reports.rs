@@ -15,14 +15,14 @@ pub(crate) struct ExecutionReport {
     seed: u64,
     /// Strides of a complete simulated walk.
     strides: u32,
-    /// Range from which the body masses of disturbed walks are drawn, kg: ±5 %, limited to the range of the model.
+    /// Range from which the body masses of disturbed simulated walks are drawn, kg: ±5 %, limited to the range of the model.
     #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
     body_mass_kg: [f64; 2],
     /// Completed strides without any disturbance.
     undisturbed_strides: u32,
-    /// Randomly disturbed walks, for each kind of ground.
-    grounds: Vec<WalksOnGround>,
-    /// Undisturbed walks on level ground, ordered from hard ground to soft ground. In all other walks the ground yields
+    /// Randomly disturbed simulated walks, for each kind of ground.
+    grounds: Vec<SimulatedWalksOnGround>,
+    /// Undisturbed simulated walks on level ground, ordered from hard ground to soft ground. In all others the ground yields
     /// 0.01 m under body weight.
     strides_by_yield: Vec<StridesOnYield>,
     /// Largest pushes survived. Null if the walker does not complete the undisturbed walk.
@@ -58,18 +58,18 @@ impl From<execution::ExecutionReport> for ExecutionReport {
 
 /// Simulated walks on one kind of ground.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct WalksOnGround {
+pub(crate) struct SimulatedWalksOnGround {
     /// Largest height of bumps and depth of dips in the ground, m.
     ground_height_m: f64,
     /// Number of simulated walks.
-    walks: u32,
-    /// Walks that completed all strides.
+    simulated_walks: u32,
+    /// Simulated walks that completed all strides.
     completed: u32,
-    /// Walks that ended with a fall.
+    /// Simulated walks that ended with a fall.
     fell: u32,
-    /// Walks that ended with a halt: the walker took no further step.
+    /// Simulated walks that ended with a halt: the walker took no further step.
     halted: u32,
-    /// Share of completed walks.
+    /// Share of completed simulated walks.
     completed_share: f64,
     /// 95 % confidence interval of this share (Wilson).
     #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
@@ -88,11 +88,11 @@ pub(crate) struct WalksOnGround {
     ankle_rate_limited_share: f64,
 }
 
-impl From<execution::WalksOnGround> for WalksOnGround {
-    fn from(ground: execution::WalksOnGround) -> Self {
-        let execution::WalksOnGround {
+impl From<execution::SimulatedWalksOnGround> for SimulatedWalksOnGround {
+    fn from(ground: execution::SimulatedWalksOnGround) -> Self {
+        let execution::SimulatedWalksOnGround {
             ground_height_m,
-            walks,
+            simulated_walks,
             completed,
             fell,
             halted,
@@ -106,7 +106,7 @@ impl From<execution::WalksOnGround> for WalksOnGround {
         } = ground;
         Self {
             ground_height_m,
-            walks,
+            simulated_walks,
             completed,
             fell,
             halted,

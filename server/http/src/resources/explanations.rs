@@ -64,7 +64,7 @@ pub(crate) struct Conflict {
     /// Number of starting points of the search.
     #[schema(value_type = u64)]
     starts: usize,
-    /// Whether a solve ended undecided, such as `stalled` or `time_limit`. If so, infeasibility is not certain.
+    /// Whether a solve ended without a decision, for example as `stalled` or `time_limit`. If so, infeasibility is not certain.
     undecided: bool,
 }
 
@@ -95,7 +95,7 @@ pub(crate) struct Relaxation {
     to: Option<f64>,
     /// The loosest value tried that does not give a gait.
     not_with: f64,
-    /// Whether the solve at the `not_with` value ended undecided. If so, infeasibility is not certain.
+    /// Whether the solve at the `not_with` value ended without a decision. If so, infeasibility is not certain.
     undecided: bool,
     /// Number of solves.
     #[schema(value_type = u64)]
@@ -142,7 +142,7 @@ impl From<explanation::RelaxedBound> for RelaxedBound {
 pub(crate) struct JointRelaxation {
     /// The bounds, one from each conflict.
     bounds: Vec<RelaxedBound>,
-    /// Whether a solve at the `not_with` values ended undecided. If so, infeasibility is not certain.
+    /// Whether a solve at the `not_with` values ended without a decision. If so, infeasibility is not certain.
     undecided: bool,
     /// Number of solves.
     #[schema(value_type = u64)]

@@ -1,4 +1,4 @@
-//! Preferences, ties and suggestions, and retractions.
+//! Preferences and suggestions, and their retractions.
 
 use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Source};
@@ -6,7 +6,7 @@ use gaitwright_store::{FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A preference, a tie or a suggestion of a study.
+/// A preference or a suggestion of a study.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Preference {
     /// Sequence number.
@@ -83,7 +83,7 @@ pub(crate) enum PreferenceContent {
         loser: TrialId,
     },
     /// Two trials are equally good.
-    Tie {
+    NoDifference {
         /// One trial.
         a: TrialId,
         /// The other trial.
@@ -94,7 +94,7 @@ pub(crate) enum PreferenceContent {
         /// Index of the suggested action.
         #[schema(value_type = u64)]
         suggested: ActionIndex,
-        /// Trial that it would have been better than.
+        /// Trial to which the suggested action is preferred.
         over: TrialId,
     },
 }
@@ -104,7 +104,7 @@ impl From<feedback::FeedbackContent> for PreferenceContent {
         match content {
             feedback::FeedbackContent::Label { trial, category } => Self::Label { trial, category },
             feedback::FeedbackContent::Preference { winner, loser } => Self::Preference { winner, loser },
-            feedback::FeedbackContent::Tie { a, b } => Self::Tie { a, b },
+            feedback::FeedbackContent::NoDifference { a, b } => Self::NoDifference { a, b },
             feedback::FeedbackContent::Suggestion { suggested, over } => Self::Suggestion { suggested, over },
         }
     }

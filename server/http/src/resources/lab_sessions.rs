@@ -1,6 +1,6 @@
 //! Lab sessions.
 
-use gaitwright_service::studies::lab::{self, AnswerView, Condition, LabSessionState};
+use gaitwright_service::studies::lab::{self, AnswerView, LabSessionState, WalkCondition};
 use gaitwright_store::{Instant, LabSessionId, StudyId, TrialId, allocations, lab_sessions};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -49,7 +49,7 @@ pub(crate) struct WalkView {
     /// Number of the walk, 1 to 3.
     number: u8,
     /// Condition of the walk. Null while it is blinded.
-    condition: Option<Condition>,
+    condition: Option<WalkCondition>,
     /// Who recorded the walk, and when. Null if it is not recorded yet.
     recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.

@@ -11,7 +11,7 @@ pub(crate) struct MeasurementFile {
     /// Identifier.
     id: MeasurementFileId,
     /// Identifier of the lab session.
-    session_id: LabSessionId,
+    lab_session_id: LabSessionId,
     /// Number of the walk, 1 to 3.
     walk: u8,
     /// Kind of measurement.
@@ -28,8 +28,16 @@ pub(crate) struct MeasurementFile {
 
 impl From<measurement_files::MeasurementFile> for MeasurementFile {
     fn from(row: measurement_files::MeasurementFile) -> Self {
-        let measurement_files::MeasurementFile { id, session_id, walk, kind, file_name, raw_sha256, actor, created_at } =
-            row;
-        Self { id, session_id, walk, kind, file_name, raw_sha256, actor, created_at }
+        let measurement_files::MeasurementFile {
+            id,
+            lab_session_id,
+            walk,
+            kind,
+            file_name,
+            raw_sha256,
+            actor,
+            created_at,
+        } = row;
+        Self { id, lab_session_id, walk, kind, file_name, raw_sha256, actor, created_at }
     }
 }

@@ -323,7 +323,7 @@ pub(crate) struct Iteration {
     #[schema(value_type = u64)]
     iteration: usize,
     /// Phase of the solve: `tracking` and `muscle_tracking`, tracking of the reference gait without and with muscles;
-    /// `plain_cost`, minimisation of the cost of transport without muscles, before that with muscles; `cost`,
+    /// `plain_cost`, minimisation of the cost of transport without muscles, which precedes the one with muscles; `cost`,
     /// minimisation of the cost of transport; `inter_node`, minimisation with tightened bounds.
     #[schema(value_type = String)]
     phase: SolvePhase,

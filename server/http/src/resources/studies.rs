@@ -3,7 +3,7 @@
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use gaitwright_service::studies::study_plan_schemas;
-use gaitwright_store::studies::{self, Evaluation, FeedbackMode, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{self, AnswerSource, Evaluation, StudyState, WarmStartFrom};
 use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -76,7 +76,7 @@ pub(crate) struct StudyPlan {
     /// Identifier of the subject.
     subject_id: SubjectId,
     /// Height and mass used by solves, independent of later corrections.
-    body: Body,
+    body: BodyMeasures,
     /// Identifier of the device.
     device_id: DeviceId,
     /// Identifier of the reference gait for Gait RMSE.
@@ -85,26 +85,26 @@ pub(crate) struct StudyPlan {
     /// C4).
     muscles: bool,
     /// Settings of the gait problem.
-    #[schema(value_type = study_plan_schemas::GaitSettings)]
+    #[schema(value_type = study_plan_schemas::GaitSettingsSchema)]
     gait_settings: Box<GaitSettings>,
     /// Options of the solver: limits, tolerance, initial guesses and retries.
-    #[schema(value_type = study_plan_schemas::SolveOptions)]
+    #[schema(value_type = study_plan_schemas::SolveOptionsSchema)]
     solve_options: SolveOptions,
     /// Values of bounds that are not tuned.
-    #[schema(value_type = study_plan_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::BoundsSchema)]
     base_bounds: TunedBounds,
     /// Tuned bounds and their values, with each dimension named after its bound.
-    #[schema(value_type = study_plan_schemas::SearchSpace)]
+    #[schema(value_type = study_plan_schemas::SearchSpaceSchema)]
     search_space: SearchSpace,
     /// Settings of the learner.
-    #[schema(value_type = study_plan_schemas::LearnerSettings)]
+    #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     learner: LearnerSettings,
     /// Who answers comparisons.
-    feedback_mode: FeedbackMode,
+    answer_source: AnswerSource,
     /// What evaluates trials.
     evaluation: Evaluation,
     /// Number of trials.
-    trial_budget: u32,
+    number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.
@@ -135,9 +135,9 @@ impl From<studies::StudyPlan> for StudyPlan {
             base_bounds,
             search_space,
             learner,
-            feedback_mode,
+            answer_source,
             evaluation,
-            trial_budget,
+            number_of_trials,
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,
@@ -158,9 +158,9 @@ impl From<studies::StudyPlan> for StudyPlan {
             base_bounds,
             search_space,
             learner,
-            feedback_mode,
+            answer_source,
             evaluation,
-            trial_budget,
+            number_of_trials,
             solve_seconds_budget,
             unchanged_limit,
             repeat_results,
@@ -174,14 +174,14 @@ impl From<studies::StudyPlan> for StudyPlan {
 
 /// Height and mass of a subject.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct Body {
+pub(crate) struct BodyMeasures {
     /// Body height, m.
     height_m: f64,
     /// Body mass, kg.
     body_mass_kg: f64,
 }
 
-impl From<gait_optimizer::Subject> for Body {
+impl From<gait_optimizer::Subject> for BodyMeasures {
     fn from(subject: gait_optimizer::Subject) -> Self {
         let gait_optimizer::Subject { height_m, body_mass_kg } = subject;
         Self { height_m, body_mass_kg }

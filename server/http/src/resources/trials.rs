@@ -22,7 +22,7 @@ pub(crate) struct Trial {
     #[schema(value_type = u64)]
     action_index: ActionIndex,
     /// The action: values of the bounds a1 to a8, tuned or fixed.
-    #[schema(value_type = study_plan_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::BoundsSchema)]
     action: TunedBounds,
     /// Reason for the trial.
     reason: String,
@@ -36,11 +36,11 @@ pub(crate) struct Trial {
     state: TrialState,
     /// How the solve ended. Null without a completed solve.
     status: Option<SolveStatus>,
-    /// Gait RMSE of a converged gait, rad. Null without one, and if the script that evaluated the trial did not report
-    /// it. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
+    /// Gait RMSE of a converged gait, rad. Null if the trial has no converged gait, or if the script
+    /// that evaluated it did not report the value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Option<f64>,
-    /// Cost of transport of a converged gait, dimensionless. Null without one, and if the script that evaluated the
-    /// trial did not report it.
+    /// Cost of transport of a converged gait, dimensionless. Null if the trial has no converged gait, or if the
+    /// script that evaluated it did not report the value.
     cost_of_transport: Option<f64>,
     /// Objective of the solve. Null without a completed solve.
     objective: Option<f64>,

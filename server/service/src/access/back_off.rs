@@ -99,7 +99,7 @@ pub async fn begin(
         wait = wait.max(found.map_or(0.0, |found| found.waits_until.seconds_since(now)));
     }
     if wait > 0.0 {
-        note(writer, "session.wait", &name, &origin, attempts).await?;
+        note(writer, "sign_in.delay", &name, &origin, attempts).await?;
         return Ok(Err(Duration::from_secs_f64(wait)));
     }
     for count in &counts {
@@ -119,7 +119,7 @@ impl PasswordAttempt {
             let counted = count.failures(writer).await?.map_or(1, |found| found.count);
             count.set(writer, now, counted).await?;
         }
-        note(writer, "session.refuse", &self.name, &self.origin, self.attempts).await
+        note(writer, "sign_in.refused", &self.name, &self.origin, self.attempts).await
     }
 
     /// Records a correct password and clears the counts of this name. The shared count stays, or anyone with an account
@@ -171,12 +171,12 @@ fn normal(name: &str) -> String {
 
 /// Writes a row of the audit trail for the first attempts of a network, then for the 10th, 20th, 50th, 100th and so on,
 /// so that thousands of attempts do not fill the trail.
-async fn note(writer: &mut Writer, action: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
+async fn note(writer: &mut Writer, change: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
     if !is_recorded(attempts) {
         return Ok(());
     }
     let detail = json!({ "name": name, "network": origin.network, "failed_attempts_of_network": attempts });
-    Ok(audit::append(writer, &Actor::anonymous(), action, "session", &detail).await?)
+    Ok(audit::append(writer, &Actor::anonymous(), change, "session", &detail).await?)
 }
 
 /// Deletes counts that are a day old. The audit trail keeps the number of attempts.
@@ -187,7 +187,7 @@ async fn prune(writer: &mut Writer, now: Instant) -> Result<(), Error> {
             "first_at": source.first_at, "last_at": source.last_at,
         });
         if source.attempts > 0 {
-            audit::append(writer, &Actor::program(), "session.refused", "session", &detail).await?;
+            audit::append(writer, &Actor::program(), "sign_in.failures", "session", &detail).await?;
         }
     }
     Ok(())

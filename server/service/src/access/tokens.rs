@@ -53,7 +53,7 @@ pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<
             Error::conflict(format!("A token named {name:?} already exists. Choose another name."))
         })?;
     let detail = json!({ "name": name, "scopes": new.scopes });
-    audit::append(writer, actor, "token.make", &format!("token {}", token.id), &detail).await?;
+    audit::append(writer, actor, "token.create", &format!("token {}", token.id), &detail).await?;
     Ok((token, secret))
 }
 

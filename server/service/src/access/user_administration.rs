@@ -107,8 +107,8 @@ pub async fn set_disabled(writer: &mut Writer, actor: &Actor, id: UserId, disabl
         tokens::revoke_all_of(writer, actor, id).await?;
     }
     users::set_disabled(writer, id, disabled).await?;
-    let action = if disabled { "user.disable" } else { "user.enable" };
-    audit::append(writer, actor, action, &format!("user {id}"), &json!({ "name": user.name })).await?;
+    let change = if disabled { "user.disable" } else { "user.enable" };
+    audit::append(writer, actor, change, &format!("user {id}"), &json!({ "name": user.name })).await?;
     Ok(users::get(writer, id).await?)
 }
 

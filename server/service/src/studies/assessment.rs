@@ -1,7 +1,7 @@
 //! Records and retracts assessments: answers of staff about two gaits that state no preference (cannot tell, or
 //! unsafe).
 
-use super::answer::attribution;
+use super::pair_answer::attribution;
 use super::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::access::Caller;
 use crate::error::Error;
@@ -106,7 +106,7 @@ pub async fn retract(
         ));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, " that say why the assessment is retracted")?;
+    let reason = printable::reason("reason", reason, ", the reason for the retraction")?;
     if !assessments::retract(writer, id, author, reason).await? {
         return Err(Error::conflict("This assessment was already retracted."));
     }

@@ -1,6 +1,6 @@
 //! Makes the certificate of one trial's gait and stores it.
 
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use crate::workers::Certify;
 use gait_optimizer::Gait;

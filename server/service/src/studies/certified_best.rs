@@ -1,6 +1,6 @@
 //! The certificates of the best gaits of a study, so that a recommendation always states whether its gait passed.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::certification;
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
@@ -152,9 +152,9 @@ pub async fn certify(
     store: &mut Store,
     actor: &Actor,
     snapshot: StudySnapshot,
-    beliefs: Arc<Beliefs>,
+    analyses: Arc<Analyses>,
 ) -> Result<BestCertification, Error> {
-    let rank = move |pool: &OnPool| trial_choice::ranking_to_show(pool, &snapshot, &beliefs);
+    let rank = move |pool: &OnPool| trial_choice::ranking_to_show(pool, &snapshot, &analyses);
     let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
     let mut refused = BTreeSet::new();
     loop {

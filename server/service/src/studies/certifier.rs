@@ -1,6 +1,6 @@
 //! The job that certifies a gait: requested ones, then the best ones of ended studies until one passes.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::snapshot::StudySnapshot;
 use super::trial_choice::ranking_to_show;
 use super::trial_jobs::TrialJob;
@@ -19,15 +19,15 @@ use std::sync::atomic::{AtomicI64, Ordering};
 pub(super) struct Certifier {
     store: Store,
     certify: Arc<dyn Certify>,
-    beliefs: Arc<Beliefs>,
+    analyses: Arc<Analyses>,
     /// The last event that was searched for ended studies.
     newest_event: AtomicI64,
 }
 
 impl Certifier {
     /// For the gaits of a record.
-    pub(super) fn new(store: Store, certify: Arc<dyn Certify>, beliefs: Arc<Beliefs>) -> Self {
-        Self { store, certify, beliefs, newest_event: AtomicI64::new(0) }
+    pub(super) fn new(store: Store, certify: Arc<dyn Certify>, analyses: Arc<Analyses>) -> Self {
+        Self { store, certify, analyses, newest_event: AtomicI64::new(0) }
     }
 }
 
@@ -66,8 +66,8 @@ impl TrialJob for Certifier {
             // The study recommends no gait yet.
             return Ok(None);
         }
-        let beliefs = Arc::clone(&self.beliefs);
-        let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &beliefs);
+        let analyses = Arc::clone(&self.analyses);
+        let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &analyses);
         let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let next = certified_best::next_to_certify(&mut *self.store.read().await?, &ranking, &skipped).await?;
         Ok(next.map(|trial| (trial, ())))

@@ -22,7 +22,7 @@ pub struct NewConsent {
 /// A withdrawal of consent.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Withdrawal {
+pub struct ConsentWithdrawal {
     /// Reason, 1 to 2000 characters, or `none given` if the subject gave none.
     #[schema(min_length = 1, max_length = 2000)]
     pub reason: String,
@@ -49,7 +49,7 @@ pub async fn withdraw(
     writer: &mut Writer,
     actor: &Actor,
     id: SubjectId,
-    why: &Withdrawal,
+    why: &ConsentWithdrawal,
 ) -> Result<(Consent, Vec<TrialId>), Error> {
     let reason = printable::reason("reason", &why.reason, "")?;
     subjects::get(writer, id).await?;

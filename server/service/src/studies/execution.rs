@@ -1,13 +1,13 @@
 //! The execution report of one trial's gait: what it is of, its state, and its storage.
 
 use super::study_plan::LARGEST_SEED;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::execution::{ExecutionOptions, ExecutionReport};
 use gaitwright_store::audit::{self, Actor};
 pub use gaitwright_store::execution_reports::newest;
-use gaitwright_store::execution_reports::{self, GaitSimulated};
+use gaitwright_store::execution_reports::{self, ExecutionReported};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, Packed, Store, TrialId, commit, consents, events, gaits, trials};
 use serde::{Deserialize, Serialize};
@@ -24,15 +24,15 @@ pub const MOST_WALKS: u32 = 1000;
 pub struct NewExecutionReport {
     /// Number of simulated walks on each kind of ground, 1 to 1000.
     #[schema(minimum = 1, maximum = 1000)]
-    pub walks: u32,
+    pub simulated_walks: u32,
     /// Seed of the disturbances. The same seed gives the same report.
     pub seed: u64,
 }
 
 impl Default for NewExecutionReport {
     fn default() -> Self {
-        let ExecutionOptions { walks, seed, .. } = ExecutionOptions::default();
-        Self { walks, seed }
+        let ExecutionOptions { walks: simulated_walks, seed, .. } = ExecutionOptions::default();
+        Self { simulated_walks, seed }
     }
 }
 
@@ -42,14 +42,14 @@ impl NewExecutionReport {
     /// # Errors
     /// [`Error::Invalid`] naming the field.
     pub fn options(self) -> Result<ExecutionOptions, Error> {
-        let Self { walks, seed } = self;
-        if !(1..=MOST_WALKS).contains(&walks) {
-            return Err(Error::invalid("walks", walks, &format!("1 to {MOST_WALKS}")));
+        let Self { simulated_walks, seed } = self;
+        if !(1..=MOST_WALKS).contains(&simulated_walks) {
+            return Err(Error::invalid("simulated_walks", simulated_walks, &format!("1 to {MOST_WALKS}")));
         }
         if seed > LARGEST_SEED {
             return Err(Error::invalid("seed", seed, &format!("0 to {LARGEST_SEED}")));
         }
-        Ok(ExecutionOptions { walks, seed, ..ExecutionOptions::default() })
+        Ok(ExecutionOptions { walks: simulated_walks, seed, ..ExecutionOptions::default() })
     }
 }
 
@@ -60,13 +60,13 @@ pub enum Simulation {
     None,
     /// Queued.
     Queued(NewExecutionReport),
-    /// The walks are being simulated.
+    /// The simulation is running.
     Running {
         /// The request.
         asked: NewExecutionReport,
         /// Number of simulated walks so far.
         done: u32,
-        /// Number of walks, over all grounds.
+        /// Number of simulated walks, over all grounds.
         walks: u32,
     },
     /// Somebody cancelled it.
@@ -123,11 +123,11 @@ pub(super) async fn record(
     let mut writer = store.write().await?;
     let trial = trials::get(&mut writer, id).await?;
     consents::may_be_shown(&mut writer, trial.study_id).await?;
-    let NewExecutionReport { walks, seed } = asked;
+    let NewExecutionReport { simulated_walks, seed } = asked;
     let actor = Actor::program();
     let program = actor.as_str().to_owned();
-    let simulated = GaitSimulated { trial_id: id, number: trial.number, walks, seed, program, report };
-    events::append(&mut writer, trial.study_id, execution_reports::SIMULATED, &simulated).await?;
+    let reported = ExecutionReported { trial_id: id, number: trial.number, simulated_walks, seed, program, report };
+    events::append(&mut writer, trial.study_id, execution_reports::REPORTED, &reported).await?;
     audit::append(&mut writer, &actor, execution_reports::STORED, &format!("trial {id}"), &json!(asked)).await?;
     Ok(commit(writer).await?)
 }

@@ -8,11 +8,11 @@ use gaitwright_store::execution_reports::{self, StoredReport};
 use gaitwright_store::{TrialId, Writer, consents, trials};
 use serde_json::json;
 
-/// Requests the report of a trial's gait, unless its newest one is of the same walks.
+/// Requests the report of a trial's gait, unless its newest one has the same number and seed.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field; [`Error::Conflict`] if the trial has no converged gait, a script evaluated it,
-/// the subject withdrew consent, or other walks with the gait are queued or running; [`Error::NotFound`] if the gait was
+/// the subject withdrew consent, or other simulated walks with the gait are queued or running; [`Error::NotFound`] if the gait was
 /// pruned; [`Error::NotReady`] if this process simulates no walks; errors of the database.
 pub async fn ask(
     writer: &mut Writer,
@@ -23,15 +23,16 @@ pub async fn ask(
 ) -> Result<(), Error> {
     asked.options()?;
     let open = scheduler.simulating(id).open();
-    if let Some(NewExecutionReport { walks, seed }) = open.filter(|open| *open != asked) {
+    if let Some(NewExecutionReport { simulated_walks, seed }) = open.filter(|open| *open != asked) {
         return Err(Error::conflict(format!(
-            "{walks} walks with seed {seed} are already queued or running for this gait. Wait for them, or cancel the job execution_report-{id}."
+            "{simulated_walks} simulated walks with seed {seed} are already queued or running for this gait. Wait for them, or cancel the job execution_report-{id}."
         )));
     }
     let study = trials::get(writer, id).await?.study_id;
     consents::may_be_shown(writer, study).await?;
-    let newest = newest(writer, id).await?.map(|StoredReport { simulated, .. }| simulated);
-    let exists = newest.is_some_and(|newest| (newest.walks, newest.seed) == (asked.walks, asked.seed));
+    let newest = newest(writer, id).await?.map(|StoredReport { reported, .. }| reported);
+    let exists =
+        newest.is_some_and(|newest| (newest.simulated_walks, newest.seed) == (asked.simulated_walks, asked.seed));
     if !exists {
         gait_of(writer, id).await?;
         if open.is_none() {

@@ -1,7 +1,7 @@
 //! The infeasibility explanation of one trial: its state, requests for it, and its storage.
 
 use super::solve_input::{PackedInput, SolveInput};
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use crate::workers::SolveToExplain;
 use gait_optimizer::explanation::Explanation;

@@ -5,7 +5,7 @@
 
 use super::snapshot::StudySnapshot;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Instant, TrialId};
 use serde::Serialize;
@@ -83,7 +83,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
     milestones.reverse();
     milestones.dedup_by_key(|milestone| milestone.iteration);
     milestones.reverse();
-    let rmse_decides = snapshot.study.plan.feedback_mode == FeedbackMode::Automatic;
+    let rmse_decides = snapshot.study.plan.answer_source == AnswerSource::GaitRmse;
     at_every_iteration(&milestones, &labelled, rmse_decides)
 }
 

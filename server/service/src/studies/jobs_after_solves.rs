@@ -1,6 +1,6 @@
 //! The jobs that follow the solves of trials: certificates, explanations and execution reports.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::certifier::Certifier;
 use super::execution::{NewExecutionReport, Simulation};
 use super::explainer::Explainer;
@@ -23,10 +23,10 @@ pub(super) struct JobsAfterSolves {
 
 impl JobsAfterSolves {
     /// Creates the queues; nothing runs yet.
-    pub(super) fn new(store: &Store, after_solves: AfterSolves, beliefs: &Arc<Beliefs>) -> Self {
+    pub(super) fn new(store: &Store, after_solves: AfterSolves, analyses: &Arc<Analyses>) -> Self {
         let AfterSolves { certify, explain } = after_solves;
         Self {
-            certificates: TrialJobs::new(store.clone(), Certifier::new(store.clone(), certify, Arc::clone(beliefs))),
+            certificates: TrialJobs::new(store.clone(), Certifier::new(store.clone(), certify, Arc::clone(analyses))),
             explanations: TrialJobs::new(store.clone(), Explainer::new(store.clone(), explain)),
             simulations: TrialJobs::new(store.clone(), WalkSimulator::new(store.clone())),
         }

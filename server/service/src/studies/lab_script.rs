@@ -3,7 +3,7 @@
 //! Asking again before the report returns the same trial. Proposals are computed before the transaction, and written
 //! only if the study has not changed.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::lifecycle;
 use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference;
@@ -16,7 +16,7 @@ use crate::printable;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyState};
 use gaitwright_store::trials::{NewTrial, ScriptOutcome, Trial, TrialState};
 use gaitwright_store::{Connection, Store, StudyId, TrialId, Writer, events, studies, trials};
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ use utoipa::ToSchema;
 /// A request for a trial.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Ask {
+pub struct AskRequest {
     /// Name of the script that evaluates the trial. A script has at most one open trial. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
@@ -51,9 +51,9 @@ pub async fn suggest(
     store: &mut Store,
     study: StudyId,
     script: &str,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<SuggestedTrial, Error> {
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let script = printable::name("script", script, 80)?;
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
@@ -73,8 +73,8 @@ pub async fn suggest(
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
     let plan = &snapshot.study.plan;
-    if snapshot.trials.len() >= plan.trial_budget as usize {
-        return Err(Error::conflict(match plan.trial_budget {
+    if snapshot.trials.len() >= plan.number_of_trials as usize {
+        return Err(Error::conflict(match plan.number_of_trials {
             1 => "The only trial of the study has been handed out.".to_owned(),
             all => format!("All {all} trials of the study have been handed out."),
         }));
@@ -86,8 +86,8 @@ pub async fn suggest(
         }));
     }
     let choose = move |pool: &OnPool| {
-        let believed = beliefs.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
-        let chosen = believed.and_then(|belief| trial_choice::next_trial(pool, &snapshot, &belief));
+        let posterior = analyses.posterior(pool, &snapshot).map_err(ChoiceError::Learner);
+        let chosen = posterior.and_then(|posterior| trial_choice::next_trial(pool, &snapshot, &posterior));
         (snapshot, chosen)
     };
     let (snapshot, chosen) = store.compute(choose).await?;
@@ -162,7 +162,7 @@ pub enum Outcome {
 /// The outcome of a trial, as a script reports it.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Tell {
+pub struct TellRequest {
     /// Whether the evaluation found a gait.
     pub outcome: Outcome,
     /// Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
@@ -190,7 +190,7 @@ pub struct CheckedOutcome {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial is not open or not evaluated by a script.
-pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Result<CheckedOutcome, Error> {
+pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &TellRequest) -> Result<CheckedOutcome, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
     if trial.script.is_none() {
@@ -209,7 +209,7 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Resul
     let (TrialState::Converged, Some(rmse)) = (outcome.state, outcome.gait_rmse_rad) else {
         return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
     };
-    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+    if snapshot.study.plan.answer_source == AnswerSource::People {
         return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
     }
     let find = move |pool: &OnPool| {
@@ -225,7 +225,7 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &Tell) -> Resul
     Ok(CheckedOutcome { snapshot, outcome, answers })
 }
 
-fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
+fn checked(study: &Study, tell: &TellRequest) -> Result<ScriptOutcome, Error> {
     let reason = tell.reason.trim();
     printable::note("reason", reason, 2000)?;
     for (field, value) in [("gait_rmse_rad", tell.gait_rmse_rad), ("cost_of_transport", tell.cost_of_transport)] {
@@ -236,11 +236,11 @@ fn checked(study: &Study, tell: &Tell) -> Result<ScriptOutcome, Error> {
     let state = match tell.outcome {
         Outcome::Converged => TrialState::Converged,
         Outcome::NotConverged if reason.is_empty() => {
-            return Err(Error::invalid("reason", "", "1 to 2000 characters that say why no gait was found"));
+            return Err(Error::invalid("reason", "", "1 to 2000 characters, the reason why no gait was found"));
         }
         Outcome::NotConverged => TrialState::NotConverged,
     };
-    let answered_by_rmse = study.plan.feedback_mode != FeedbackMode::Human;
+    let answered_by_rmse = study.plan.answer_source != AnswerSource::People;
     if state == TrialState::Converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
         let allowed = "a number, because Gait RMSE answers the comparisons of this study";
         return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));

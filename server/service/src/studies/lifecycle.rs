@@ -4,7 +4,7 @@
 //! not_started -> running <-> waiting        running, waiting -> finished
 //!          running, waiting -> paused -> running
 //!          not_started, running, waiting, paused -> stopped
-//!          finished, stopped -> running     (with a larger budget: `extend`)
+//!          finished, stopped -> running     (with more trials: `extend`)
 //! ```
 
 use crate::error::Error;
@@ -23,11 +23,11 @@ pub enum StudyTransition {
     Pause,
     /// A person resumes the study.
     Resume,
-    /// The budget is used up, or a stopping rule applies.
+    /// All trials are made, or a stopping rule applies.
     Finish,
     /// A person stops the study.
     Stop,
-    /// A person raises the budget of an ended study.
+    /// A person raises the number of trials of an ended study.
     Extend,
 }
 

@@ -4,12 +4,12 @@
 //! [`Scheduler`](scheduler::Scheduler) applies them: it proposes trials, dispatches solves and records results. All its
 //! state is in the record, so a new process continues where a killed one stopped.
 
-pub mod answer;
+pub mod analysis;
 pub mod archive;
 pub mod assessment;
 pub mod atlas;
-pub mod belief;
 pub mod blind;
+pub mod bound_grid;
 pub mod built_in_entries;
 pub mod certificate_request;
 pub mod certification;
@@ -23,7 +23,7 @@ pub mod execution;
 pub mod execution_request;
 mod explainer;
 pub mod explanation;
-pub mod gait_beliefs;
+pub mod gait_utilities;
 pub mod history;
 pub mod job_status;
 mod jobs_after_solves;
@@ -33,6 +33,7 @@ pub mod lifecycle;
 pub mod membership;
 pub mod nearest_reference;
 mod next_step;
+pub mod pair_answer;
 pub mod pending_comparison;
 mod planning_tasks;
 pub mod preference;
@@ -49,7 +50,6 @@ pub mod safety_review;
 pub mod same_motion;
 pub mod sample_study;
 pub mod scheduler;
-pub mod search_space;
 pub mod seed;
 pub mod sensitivities;
 pub mod snapshot;
@@ -64,7 +64,7 @@ pub mod trial_choice;
 mod trial_jobs;
 mod trial_queue;
 pub mod trial_result;
-pub mod trial_state;
+pub mod trial_transitions;
 pub mod utility_history;
 mod walk_simulator;
 pub mod walkable;

@@ -1,15 +1,15 @@
-//! Decides what a study needs next (a trial, a question, the end), as a pure function of its snapshot.
+//! Decides what a study needs next (a trial, a comparison, the end), as a pure function of its snapshot.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::lifecycle::StudyTransition;
-use super::pending_comparison::{self, Question};
+use super::pending_comparison::{self, PendingComparison};
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
 use crate::error::Error;
 use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{FeedbackId, now};
 use std::collections::HashSet;
@@ -24,19 +24,19 @@ pub(super) enum PlanningStep {
     Try(NewTrial),
 }
 
-/// Decides the next step from the snapshot alone; `beliefs` is a cache.
-pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Beliefs) -> Result<PlanningStep, Error> {
+/// Decides the next step from the snapshot alone; `analyses` is a cache.
+pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Analyses) -> Result<PlanningStep, Error> {
     let study = &snapshot.study;
-    if study.plan.feedback_mode == FeedbackMode::Human {
-        match (study.state, pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?) {
-            (StudyState::Running, Question::Pair(_)) => {
+    if study.plan.answer_source == AnswerSource::People {
+        match (study.state, pending_comparison::pending_comparison(pool, snapshot).map_err(Error::Learner)?) {
+            (StudyState::Running, PendingComparison::Pair(_)) => {
                 return Ok(PlanningStep::Transition(StudyTransition::Ask, "A comparison needs an answer.".into()));
             }
-            (StudyState::Waiting, Question::None) => {
+            (StudyState::Waiting, PendingComparison::None) => {
                 return Ok(PlanningStep::Transition(StudyTransition::Answered, String::new()));
             }
             // The comparison follows as soon as the gait is certified. No trial is proposed before.
-            (_, Question::AfterCertificate(_)) => return Ok(PlanningStep::Nothing),
+            (_, PendingComparison::AfterCertificate(_)) => return Ok(PlanningStep::Nothing),
             _ => {}
         }
     }
@@ -52,8 +52,8 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     }
     let open = snapshot.open();
     let tried = u32::try_from(snapshot.trials.len()).unwrap_or(u32::MAX);
-    if tried >= study.plan.trial_budget {
-        let reason = match study.plan.trial_budget {
+    if tried >= study.plan.number_of_trials {
+        let reason = match study.plan.number_of_trials {
             1 => "The only trial is done.".to_owned(),
             all => format!("All {all} trials are done."),
         };
@@ -71,8 +71,8 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
     if is_full || study.plan.evaluation == Evaluation::Script || trial_choice::awaits_root(snapshot) {
         return Ok(PlanningStep::Nothing);
     }
-    let belief = beliefs.posterior(pool, snapshot).map_err(Error::Learner)?;
-    match trial_choice::next_trial(pool, snapshot, &belief) {
+    let posterior = analyses.posterior(pool, snapshot).map_err(Error::Learner)?;
+    match trial_choice::next_trial(pool, snapshot, &posterior) {
         Ok(new) => Ok(PlanningStep::Try(new)),
         Err(e) if e.is_exhausted() && open == 0 => {
             Ok(PlanningStep::Transition(StudyTransition::Finish, all_known(snapshot)))
@@ -87,21 +87,21 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, beliefs: &Belie
 fn all_known(snapshot: &StudySnapshot) -> String {
     let tried: HashSet<ActionIndex> = snapshot.trials.iter().map(|trial| trial.action_index).collect();
     if (tried.len() as u64) < snapshot.study.plan.search_space.len() {
-        "Every action of the search space was tried or has the gait of one that was tried.".to_owned()
+        "Every action of the search space has been tried, or has the same gait as one that has.".to_owned()
     } else {
-        "Every action of the search space was tried.".to_owned()
+        "Every action of the search space has been tried.".to_owned()
     }
 }
 
 /// The trials that would be proposed next, one for each possible answer to the pending comparison.
 pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<NewTrial>, Error> {
-    let question = pending_comparison::open_question(pool, snapshot).map_err(Error::Learner)?;
-    let Some((a, b)) = question.trials() else { return Ok(Vec::new()) };
+    let pending = pending_comparison::pending_comparison(pool, snapshot).map_err(Error::Learner)?;
+    let Some((a, b)) = pending.trials() else { return Ok(Vec::new()) };
     let mut likely: Vec<NewTrial> = Vec::new();
     for content in [
         FeedbackContent::Preference { winner: a, loser: b },
         FeedbackContent::Preference { winner: b, loser: a },
-        FeedbackContent::Tie { a, b },
+        FeedbackContent::NoDifference { a, b },
     ] {
         let mut then = snapshot.clone();
         then.study.state = StudyState::Running;
@@ -119,7 +119,7 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             retraction: None,
         });
         // Posteriors of hypothetical answers must not enter the cache.
-        if let PlanningStep::Try(new) = next_step(pool, &then, &Beliefs::default())?
+        if let PlanningStep::Try(new) = next_step(pool, &then, &Analyses::default())?
             && !likely
                 .iter()
                 .any(|other| (other.action_index, other.warm_started_from) == (new.action_index, new.warm_started_from))

@@ -3,7 +3,7 @@
 use super::same_motion::is_same_gait;
 use super::snapshot::StudySnapshot;
 use super::walkable::{NotWalkable, WalkablePair};
-use gait_learner::{ActionIndex, FeedbackLog, LearnerError, comparisons_to_ask_among};
+use gait_learner::{ActionIndex, FeedbackLog, LearnerError, proposed_comparisons_among};
 use gaitwright_compute::OnPool;
 use gaitwright_store::TrialId;
 use gaitwright_store::feedback::FeedbackContent;
@@ -20,26 +20,26 @@ pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Ve
     let plan = &snapshot.study.plan;
     let comparable = snapshot.comparable();
     let log = snapshot.log();
-    let questions = comparisons_to_ask_among(&plan.search_space, &log, new.action_index, &plan.learner, |a| {
+    let proposed = proposed_comparisons_among(&plan.search_space, &log, new.action_index, &plan.learner, |a| {
         comparable.contains(&a)
     })?;
-    Ok(questions.into_iter().filter_map(|q| snapshot.trial_of(q.against)).map(|trial| trial.id).collect())
+    Ok(proposed.into_iter().filter_map(|c| snapshot.trial_of(c.against)).map(|trial| trial.id).collect())
 }
 
-/// The preference that Gait RMSE implies: the smaller value is better, equal values tie.
+/// The preference that Gait RMSE implies: the smaller value is better, equal values mean no difference.
 pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
     if new.1 < old.1 {
         FeedbackContent::Preference { winner: new.0, loser: old.0 }
     } else if old.1 < new.1 {
         FeedbackContent::Preference { winner: old.0, loser: new.0 }
     } else {
-        FeedbackContent::Tie { a: new.0, b: old.0 }
+        FeedbackContent::NoDifference { a: new.0, b: old.0 }
     }
 }
 
 /// The comparison that a study currently asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Question {
+pub enum PendingComparison {
     /// No comparison.
     None,
     /// This pair, with the newest gait first.
@@ -48,7 +48,7 @@ pub enum Question {
     AfterCertificate(TrialId),
 }
 
-impl Question {
+impl PendingComparison {
     /// The trials of the pair, with the newest gait first.
     pub fn trials(&self) -> Option<(TrialId, TrialId)> {
         match self {
@@ -62,8 +62,8 @@ impl Question {
 ///
 /// # Errors
 /// When the learner cannot work with the log.
-pub fn awaited_question(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
-    if snapshot.study.state.has_ended() { Ok(Question::None) } else { open_question(pool, snapshot) }
+pub fn awaited_comparison(pool: &OnPool, snapshot: &StudySnapshot) -> Result<PendingComparison, LearnerError> {
+    if snapshot.study.state.has_ended() { Ok(PendingComparison::None) } else { pending_comparison(pool, snapshot) }
 }
 
 /// The pair that a person should compare now: the newest converged gait and a different gait that nobody has compared
@@ -71,39 +71,41 @@ pub fn awaited_question(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Quest
 ///
 /// # Errors
 /// When the learner cannot work with the log.
-pub fn open_question(_: &OnPool, snapshot: &StudySnapshot) -> Result<Question, LearnerError> {
+pub fn pending_comparison(_: &OnPool, snapshot: &StudySnapshot) -> Result<PendingComparison, LearnerError> {
     let plan = &snapshot.study.plan;
     let log = snapshot.log();
     let may_be_asked = |trial: &&Trial| snapshot.grounds.may_become_walkable(trial);
     let mut candidates: HashSet<ActionIndex> =
         snapshot.trials.iter().filter(may_be_asked).map(|trial| trial.action_index).collect();
     let Some(&newest) = log.visited.iter().rev().find(|action| candidates.contains(action)) else {
-        return Ok(Question::None);
+        return Ok(PendingComparison::None);
     };
-    let Some(own) = snapshot.trial_of(newest) else { return Ok(Question::None) };
+    let Some(own) = snapshot.trial_of(newest) else { return Ok(PendingComparison::None) };
     candidates.retain(|action| {
         *action == newest || !snapshot.trial_of(*action).is_some_and(|other| is_same_gait(own, other))
     });
     // The partner derives from the answers before the newest gait. Otherwise an answer about that gait could change the
-    // best one, and with it the question.
+    // best one, and with it the comparison.
     let mut before = log.clone();
     before.feedback.retain(|feedback| match feedback.actions() {
         (a, Some(b)) => a != newest && b != newest,
         (_, None) => true,
     });
-    let questions =
-        comparisons_to_ask_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
-    let open = questions.into_iter().filter(|q| !is_answered(&log, q.action, q.against));
-    let mut pairs = open.filter_map(|q| Some((snapshot.trial_of(q.action)?, snapshot.trial_of(q.against)?)));
+    let proposed =
+        proposed_comparisons_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
+    let open = proposed.into_iter().filter(|c| !is_answered(&log, c.action, c.against));
+    let mut pairs = open.filter_map(|c| Some((snapshot.trial_of(c.action)?, snapshot.trial_of(c.against)?)));
     let Some((first, second)) = pairs.find(|(a, b)| !snapshot.grounds.safety_reports.is_skipped((a.id, b.id))) else {
-        return Ok(Question::None);
+        return Ok(PendingComparison::None);
     };
     Ok(match (snapshot.walkable(first), snapshot.walkable(second)) {
-        (Ok(a), Ok(b)) => WalkablePair::of((a, first), (b, second)).map_or(Question::None, Question::Pair),
-        (Err(NotWalkable::NotCertified { id, .. }), _) | (_, Err(NotWalkable::NotCertified { id, .. })) => {
-            Question::AfterCertificate(id)
+        (Ok(a), Ok(b)) => {
+            WalkablePair::of((a, first), (b, second)).map_or(PendingComparison::None, PendingComparison::Pair)
         }
-        _ => Question::None,
+        (Err(NotWalkable::NotCertified { id, .. }), _) | (_, Err(NotWalkable::NotCertified { id, .. })) => {
+            PendingComparison::AfterCertificate(id)
+        }
+        _ => PendingComparison::None,
     })
 }
 

@@ -2,7 +2,7 @@
 //! ends here. A test fails if another module writes the table.
 
 use super::same_motion::is_same_gait;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;
 use crate::printable;
@@ -103,7 +103,7 @@ async fn converged(db: &mut Connection, study: StudyId, field: &str, id: TrialId
 /// An answer of a person to a comparison that was not retracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CurrentAnswer {
-    /// A preference or a tie.
+    /// A preference, which may be no difference.
     Preference(FeedbackId),
     /// An assessment: the person cannot tell, or reported a gait as unsafe.
     Assessment(gaitwright_store::AssessmentId),

@@ -1,6 +1,6 @@
 //! Deletes trajectories of gaits that nobody needs any more.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::certified_best;
 use super::snapshot::StudySnapshot;
 use super::trial_choice::ranking_to_show;
@@ -21,7 +21,7 @@ pub async fn prune(store: &mut Store, days: u32) -> Result<u64, Error> {
     for study in ended {
         let id = study.id;
         let snapshot = StudySnapshot::read(&mut *store.read().await?, study).await?;
-        let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &Beliefs::default());
+        let rank = move |pool: &OnPool| ranking_to_show(pool, &snapshot, &Analyses::default());
         let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
         let mut writer = store.write().await?;
         let kept = certified_best::worth_keeping(&mut writer, &ranking).await?;

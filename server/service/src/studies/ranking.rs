@@ -1,4 +1,4 @@
-//! The ranking of the gaits of a study by what the learner believes.
+//! The ranking of the gaits of a study by their utility.
 
 use super::snapshot::StudySnapshot;
 use gait_learner::{LearnerError, Posterior};
@@ -9,8 +9,8 @@ use gaitwright_store::trials::{Trial, TrialState};
 ///
 /// # Errors
 /// When a trial's action is not in the search space.
-pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(snapshot, belief, |trial| !snapshot.grounds.safety_reports.forbids(trial))
+pub fn ranking(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
+    by_mean(snapshot, posterior, |trial| !snapshot.grounds.safety_reports.forbids(trial))
 }
 
 /// Converged trials by decreasing posterior mean; ties by number.
@@ -19,12 +19,12 @@ pub fn ranking(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Vec<Trial
 /// As [`ranking`].
 pub(super) fn by_mean(
     snapshot: &StudySnapshot,
-    belief: &Posterior,
+    posterior: &Posterior,
     counts: impl Fn(&Trial) -> bool,
 ) -> Result<Vec<TrialId>, LearnerError> {
     let mut ranked = Vec::new();
     for trial in snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged && counts(trial)) {
-        ranked.push((belief.mean(trial.action_index)?, trial.id));
+        ranked.push((posterior.mean(trial.action_index)?, trial.id));
     }
     ranked.sort_by(|(mean_a, _), (mean_b, _)| mean_b.total_cmp(mean_a));
     Ok(ranked.into_iter().map(|(_, id)| id).collect())

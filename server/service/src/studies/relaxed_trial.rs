@@ -3,9 +3,9 @@
 //! The action is the nearest one of the search space whose relaxed bounds are at least as loose as the explanation needs, so
 //! the gait that the explanation found is a solution of it.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
+use super::bound_grid;
 use super::lifecycle::{self, StudyTransition};
-use super::search_space;
 use super::snapshot::StudySnapshot;
 use super::study_change;
 use super::trial_choice::{best_trial, warm_start_of_next};
@@ -24,10 +24,10 @@ use std::sync::Arc;
 use thiserror::Error;
 
 /// Relaxed bounds: names and values.
-pub type Relaxation = Vec<(String, f64)>;
+pub type RelaxedBounds = Vec<(String, f64)>;
 
 /// The relaxations with which the explanation found a gait: single bounds first.
-pub fn relaxations(explanation: &Explanation) -> Vec<Relaxation> {
+pub fn relaxations(explanation: &Explanation) -> Vec<RelaxedBounds> {
     let alone = explanation.relaxations.iter().filter_map(|one| Some(vec![(one.bound.clone(), one.to?)]));
     let together = explanation
         .together
@@ -76,7 +76,7 @@ impl From<NoRelaxedTrial> for Error {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RelaxedTrial {
     /// The relaxed bounds with their values in the search space.
-    pub bounds: Relaxation,
+    pub bounds: RelaxedBounds,
     /// Whether the study needs a larger number of trials for it.
     pub extends: bool,
     action: ActionIndex,
@@ -90,7 +90,7 @@ pub async fn of(
     db: &mut Connection,
     study: &Study,
     trial: &Trial,
-    relaxation: &Relaxation,
+    relaxation: &RelaxedBounds,
 ) -> Result<Result<RelaxedTrial, NoRelaxedTrial>, Error> {
     if let Err(refused) = may_take_a_trial(study) {
         return Ok(Err(refused));
@@ -103,7 +103,7 @@ pub async fn of(
     if let Some(known) = trials::of_action(db, study.id, action).await?.first() {
         return Ok(Err(NoRelaxedTrial::Tried { trial: known.id, number: known.number }));
     }
-    let extends = trials::counts(db, study.id).await?.total >= study.plan.trial_budget;
+    let extends = trials::counts(db, study.id).await?.total >= study.plan.number_of_trials;
     Ok(Ok(RelaxedTrial { bounds, extends, action }))
 }
 
@@ -111,7 +111,7 @@ fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
     let refused = match study.state {
         _ if study.plan.evaluation == Evaluation::Script => "A lab script evaluates the trials of this study.",
         _ if study.archived_at.is_some() => {
-            "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} in its details first."
+            "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} on its page Name, tags and notes first."
         }
         StudyState::Running | StudyState::Finished => return Ok(()),
         StudyState::NotStarted => "The study has not started.",
@@ -126,10 +126,10 @@ fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
 fn relaxed(
     space: &SearchSpace,
     from: ActionIndex,
-    relaxation: &Relaxation,
-) -> Result<Result<(ActionIndex, Relaxation), NoRelaxedTrial>, LearnerError> {
+    relaxation: &RelaxedBounds,
+) -> Result<Result<(ActionIndex, RelaxedBounds), NoRelaxedTrial>, LearnerError> {
     let mut levels = space.levels(space.check(from)?);
-    let mut bounds = Relaxation::new();
+    let mut bounds = RelaxedBounds::new();
     for (bound, needed) in relaxation {
         let tuned = space.dimensions().iter().zip(&mut levels).find(|(dimension, _)| dimension.name == *bound);
         let Some((dimension, level)) = tuned else { return Ok(Err(NoRelaxedTrial::NotTuned(bound.clone()))) };
@@ -157,7 +157,7 @@ pub struct ChosenTrial {
     new: NewTrial,
     /// The trial without a gait.
     from: TrialId,
-    bounds: Relaxation,
+    bounds: RelaxedBounds,
 }
 
 /// Chooses the trial that tries a relaxation of an explanation, outside any transaction.
@@ -169,7 +169,7 @@ pub async fn choose(
     store: &mut Store,
     id: TrialId,
     place: usize,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
 ) -> Result<ChosenTrial, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
@@ -182,11 +182,11 @@ pub async fn choose(
     let RelaxedTrial { bounds, action, .. } = of(&mut db, &study, &trial, relaxation).await??;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let beliefs = Arc::clone(beliefs);
+    let analyses = Arc::clone(analyses);
     let rank = move |pool: &OnPool| {
-        let belief = beliefs.posterior(pool, &snapshot);
-        let ranked = belief.and_then(|belief| {
-            Ok::<_, LearnerError>((best_trial(&snapshot, &belief)?, warm_start_of_next(&snapshot, &belief)?))
+        let posterior = analyses.posterior(pool, &snapshot);
+        let ranked = posterior.and_then(|posterior| {
+            Ok::<_, LearnerError>((best_trial(&snapshot, &posterior)?, warm_start_of_next(&snapshot, &posterior)?))
         });
         (snapshot, ranked)
     };
@@ -196,7 +196,7 @@ pub async fn choose(
     let new = NewTrial {
         number: snapshot.trials.last().map_or(1, |newest| newest.number + 1),
         action_index: action,
-        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, action)?,
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action)?,
         reason: format!("requested by a person: trial {} with {} relaxed", trial.number, names(&bounds)),
         best_before,
         warm_started_from,
@@ -205,7 +205,7 @@ pub async fn choose(
 }
 
 /// `a5 and a7`.
-fn names(bounds: &Relaxation) -> String {
+fn names(bounds: &RelaxedBounds) -> String {
     bounds.iter().map(|(bound, _)| bound.as_str()).collect::<Vec<_>>().join(" and ")
 }
 
@@ -220,11 +220,11 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
         return Ok(None);
     }
     let study = &snapshot.study;
-    let trial_budget = study.plan.trial_budget.max(new.number);
+    let number_of_trials = study.plan.number_of_trials.max(new.number);
     let state =
         if study.state.has_ended() { lifecycle::after(study.state, StudyTransition::Extend)? } else { study.state };
-    if (state, trial_budget) != (study.state, study.plan.trial_budget) {
-        study_change::raise_budget(writer, study, trial_budget, state).await?;
+    if (state, number_of_trials) != (study.state, study.plan.number_of_trials) {
+        study_change::raise_number_of_trials(writer, study, number_of_trials, state).await?;
         events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": "trial.relax" })).await?;
     }
     let Some(trial) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
@@ -234,7 +234,7 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
     let detail = json!({
         "study": study.id, "number": new.number, "without_gait": from,
         "bounds": bounds.iter().cloned().collect::<BTreeMap<_, _>>(),
-        "trial_budget": trial_budget,
+        "number_of_trials": number_of_trials,
     });
     audit::append(writer, actor, "trial.relax", &format!("trial {trial}"), &detail).await?;
     Ok(Some(trial))
@@ -255,7 +255,7 @@ mod tests {
         SearchSpace::new(vec![dimension("a5", &[0.0, 0.02, 0.04]), dimension("a7", &[20.0, 35.0, 50.0])]).unwrap()
     }
 
-    fn found(relaxation: &[(&str, f64)]) -> Result<(Vec<f64>, Relaxation), NoRelaxedTrial> {
+    fn found(relaxation: &[(&str, f64)]) -> Result<(Vec<f64>, RelaxedBounds), NoRelaxedTrial> {
         let (space, relaxation) = (space(), relaxation.iter().map(|(name, to)| ((*name).to_owned(), *to)).collect());
         // The tightest action: a5 is a lower bound.
         let from = space.index_of_values(&[0.04, 20.0]).unwrap();

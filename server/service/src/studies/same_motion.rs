@@ -4,7 +4,7 @@
 use gait_optimizer::{SolveReport, TunedBounds};
 use gaitwright_store::trials::{Trial, TrialState};
 
-/// Relative difference up to which two figures count as the same. Solves that find the same gait from
+/// Relative difference up to which two results count as the same. Solves that find the same gait from
 /// different starts can differ by more than 1e-5.
 const TOLERANCE: f64 = 1e-4;
 /// Difference up to which two durations count as the same, s. The shortest domains last 20 ms, so a relative tolerance
@@ -20,8 +20,8 @@ pub struct GaitMotion {
 
 #[derive(Debug, Clone, PartialEq)]
 enum KnownBy {
-    /// The optimiser computed the gait, and these figures of its report identify it.
-    Figures(MotionFigures),
+    /// The optimiser computed the gait, and these results of its report identify it.
+    Results(MotionResults),
     /// A lab script evaluated the bounds with a tool of its own, so nothing but the bounds identifies the gait.
     Bounds,
 }
@@ -30,7 +30,7 @@ impl GaitMotion {
     /// The motion of a trial; `None` if the trial has no gait.
     pub fn of(trial: &Trial) -> Option<Self> {
         let known_by =
-            trial.report.as_ref().map_or(KnownBy::Bounds, |report| KnownBy::Figures(MotionFigures::of(report)));
+            trial.report.as_ref().map_or(KnownBy::Bounds, |report| KnownBy::Results(MotionResults::of(report)));
         (trial.state == TrialState::Converged).then_some(Self { known_by, bounds: trial.action })
     }
 
@@ -42,32 +42,32 @@ impl GaitMotion {
     /// Whether the gaits of two trials with the same device are the same. If one of them is known by its bounds only,
     /// equal bounds count as the same gait: staff can clear a gait that a report closes without need.
     pub fn is_same(&self, other: &Self) -> bool {
-        self.figures_agree(other).unwrap_or(self.bounds == other.bounds)
+        self.values_agree(other).unwrap_or(self.bounds == other.bounds)
     }
 
     /// Whether the gaits of two trials with different devices are the same, where equal bounds mean nothing.
     pub fn is_same_with_another_device(&self, other: &Self) -> bool {
-        self.figures_agree(other).unwrap_or(false)
+        self.values_agree(other).unwrap_or(false)
     }
 
-    fn figures_agree(&self, other: &Self) -> Option<bool> {
+    fn values_agree(&self, other: &Self) -> Option<bool> {
         match (&self.known_by, &other.known_by) {
-            (KnownBy::Figures(own), KnownBy::Figures(others)) => Some(own.agree(others)),
+            (KnownBy::Results(own), KnownBy::Results(others)) => Some(own.agree(others)),
             _ => None,
         }
     }
 }
 
-/// Figures of a report that identify a motion.
+/// Results of a report that identify a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct MotionFigures {
+struct MotionResults {
     cost_of_transport: f64,
     stride_length_m: f64,
     vhip_m_s: [f64; 4],
     durations_s: [f64; 8],
 }
 
-impl MotionFigures {
+impl MotionResults {
     fn of(report: &SolveReport) -> Self {
         let SolveReport { cost_of_transport, stride_length_m, vhip_m_s, durations_s, .. } = *report;
         Self { cost_of_transport, stride_length_m, vhip_m_s, durations_s }
@@ -91,8 +91,8 @@ pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
 mod tests {
     use super::*;
 
-    const FIGURES: MotionFigures =
-        MotionFigures { cost_of_transport: 0.07, stride_length_m: 1.31, vhip_m_s: [1.0; 4], durations_s: [0.1; 8] };
+    const RESULTS: MotionResults =
+        MotionResults { cost_of_transport: 0.07, stride_length_m: 1.31, vhip_m_s: [1.0; 4], durations_s: [0.1; 8] };
 
     fn motion(known_by: KnownBy, a1: f64) -> GaitMotion {
         GaitMotion { known_by, bounds: TunedBounds { a1, ..TunedBounds::default() } }
@@ -100,18 +100,18 @@ mod tests {
 
     #[test]
     fn computed_motions_are_compared_by_their_figures_and_not_by_their_bounds() {
-        let one = motion(KnownBy::Figures(FIGURES), 15.0);
-        let scales: [fn(&mut MotionFigures, f64); 4] = [
-            |figures, factor| figures.cost_of_transport *= factor,
-            |figures, factor| figures.stride_length_m *= factor,
-            |figures, factor| figures.vhip_m_s[3] *= factor,
-            |figures, factor| figures.durations_s[7] *= factor,
+        let one = motion(KnownBy::Results(RESULTS), 15.0);
+        let scales: [fn(&mut MotionResults, f64); 4] = [
+            |results, factor| results.cost_of_transport *= factor,
+            |results, factor| results.stride_length_m *= factor,
+            |results, factor| results.vhip_m_s[3] *= factor,
+            |results, factor| results.durations_s[7] *= factor,
         ];
         for scale in scales {
             let scaled = |factor| {
-                let mut figures = FIGURES;
-                scale(&mut figures, factor);
-                motion(KnownBy::Figures(figures), 16.0)
+                let mut results = RESULTS;
+                scale(&mut results, factor);
+                motion(KnownBy::Results(results), 16.0)
             };
             let (near, far) = (scaled(1.0 + 5e-5), scaled(1.0 + 3e-3));
             assert!(one.is_same(&near) && one.is_same_with_another_device(&near), "{near:?}");
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn motions_without_figures_are_the_same_if_their_bounds_are_equal_on_one_device() {
-        let computed = motion(KnownBy::Figures(FIGURES), 15.0);
+        let computed = motion(KnownBy::Results(RESULTS), 15.0);
         let by_lab = motion(KnownBy::Bounds, 15.0);
         for other in [&computed, &by_lab] {
             assert!(by_lab.is_same(other) && other.is_same(&by_lab));

@@ -18,6 +18,6 @@ const TRIALS: u32 = 8;
 pub async fn create(writer: &mut Writer, caller: &Caller) -> Result<Study, Error> {
     let subject = built_in_entries::subject_with(writer, Subject::builtin(1)?).await?;
     let name = study_plan::free_name(writer, caller.reach(), "Sample study").await?;
-    let new = NewStudy { name: Some(name), muscles: false, trial_budget: TRIALS, ..NewStudy::of(subject.id) };
+    let new = NewStudy { name: Some(name), muscles: false, number_of_trials: TRIALS, ..NewStudy::of(subject.id) };
     study_plan::create_by(writer, caller, new).await
 }

@@ -1,7 +1,7 @@
 //! The sensitivities of one trial's gait, computed from its stored solution.
 
 use super::solve_input::PackedInput;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_learner::SearchSpace;
 use gait_optimizer::sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError, sensitivities};
@@ -121,7 +121,7 @@ pub fn refusal(error: GaitSensitivityError) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::search_space::table_i;
+    use crate::studies::bound_grid::table_i;
     use gait_optimizer::sensitivity::ResultDerivatives;
 
     fn bound(bound: &'static str, value: f64, interval: (Option<f64>, Option<f64>)) -> BoundSensitivity {

@@ -1,12 +1,12 @@
 //! A consistent snapshot of a study: its trials, its feedback log and its walkable gaits.
 
-use super::search_space;
+use super::bound_grid;
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use crate::error::Error;
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study};
 use gaitwright_store::trials::{NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studies, trials};
 use std::collections::{HashMap, HashSet};
@@ -118,7 +118,7 @@ impl StudySnapshot {
 
     /// Whether people answer the comparisons, and have given no valid answer yet.
     pub fn waits_for_first_answer(&self) -> bool {
-        self.study.plan.feedback_mode == FeedbackMode::Human && !self.feedback.iter().any(is_answer_of_a_person)
+        self.study.plan.answer_source == AnswerSource::People && !self.feedback.iter().any(is_answer_of_a_person)
     }
 
     /// Whether results and answers name a best action: a trial converged, and people, if they answer, have done so.
@@ -203,7 +203,7 @@ impl StudySnapshot {
         let unsafe_bounds =
             self.grounds.safety_reports.reported_bounds().filter(|_| plan.evaluation == Evaluation::Script);
         let unsafe_actions =
-            unsafe_bounds.filter_map(|bounds| search_space::action_of(&plan.search_space, plan.base_bounds, bounds));
+            unsafe_bounds.filter_map(|bounds| bound_grid::action_of(&plan.search_space, plan.base_bounds, bounds));
         open.chain(unsafe_actions).collect()
     }
 }
@@ -222,7 +222,7 @@ fn in_terms_of_actions(content: &FeedbackContent, action: impl Fn(TrialId) -> Op
         FeedbackContent::Preference { winner, loser } => {
             Feedback::Preference { winner: action(winner)?, loser: action(loser)? }
         }
-        FeedbackContent::Tie { a, b } => Feedback::Tie { a: action(a)?, b: action(b)? },
+        FeedbackContent::NoDifference { a, b } => Feedback::NoDifference { a: action(a)?, b: action(b)? },
         FeedbackContent::Suggestion { suggested, over } => Feedback::Suggestion { suggested, over: action(over)? },
     };
     match feedback.actions() {

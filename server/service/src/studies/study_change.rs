@@ -6,7 +6,7 @@ use super::study_plan;
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{FeedbackMode, Study, StudyLimits, StudyState};
+use gaitwright_store::studies::{AnswerSource, Study, StudyLimits, StudyState};
 use gaitwright_store::{StudyId, Writer, events, members, now, studies};
 use serde::Deserialize;
 use serde_json::json;
@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 /// Changes to a study. Absent fields keep their values.
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Change {
+pub struct StudyChange {
     /// Name shown to users.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 120)]
@@ -83,7 +83,7 @@ pub(super) fn check_filing(study: &Study) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`].
-pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Change) -> Result<Study, Error> {
+pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &StudyChange) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let name = match change.name.as_deref().map(str::trim) {
         None => study.plan.name.clone(),
@@ -93,7 +93,7 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
         name,
         priority: change.priority.unwrap_or(study.plan.priority),
         parallel_trials: change.parallel_trials.unwrap_or(study.plan.parallel_trials),
-        trial_budget: study.plan.trial_budget,
+        number_of_trials: study.plan.number_of_trials,
     };
     study_plan::check_range("priority", i64::from(limits.priority), -10, 10)?;
     study_plan::check_range("parallel_trials", i64::from(limits.parallel_trials), 1, 64)?;
@@ -134,26 +134,26 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &Ch
 /// A larger number of trials.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Extend {
-    /// Total number of trials. Must exceed the current budget.
+pub struct StudyExtension {
+    /// Number of trials. Must exceed the current number.
     #[schema(minimum = 2, maximum = 10000)]
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
 }
 
 /// Raises the number of trials of a study. If the study has ended, it resumes.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the budget would not increase, [`Error::NotFound`].
-pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Extend) -> Result<Study, Error> {
+/// [`Error::Invalid`] if the number of trials would not increase, [`Error::NotFound`].
+pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &StudyExtension) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
-    let least = i64::from(study.plan.trial_budget) + 1;
-    study_plan::check_range("trial_budget", i64::from(more.trial_budget), least, 10_000)?;
+    let least = i64::from(study.plan.number_of_trials) + 1;
+    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, 10_000)?;
     let state = match study.state {
         ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, StudyTransition::Extend)?,
         other => other,
     };
-    raise_budget(writer, &study, more.trial_budget, state).await?;
-    let detail = json!({ "from": study.plan.trial_budget, "to": more.trial_budget, "state": state });
+    raise_number_of_trials(writer, &study, more.number_of_trials, state).await?;
+    let detail = json!({ "from": study.plan.number_of_trials, "to": more.number_of_trials, "state": state });
     changed(writer, actor, "study.extend", &study, state, &detail).await
 }
 
@@ -161,18 +161,18 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Exte
 ///
 /// # Errors
 /// [`Error::Invalid`] for too many trials, [`Error::Conflict`] if the study has changed; errors of the database.
-pub(super) async fn raise_budget(
+pub(super) async fn raise_number_of_trials(
     writer: &mut Writer,
     study: &Study,
-    trial_budget: u32,
+    number_of_trials: u32,
     state: StudyState,
 ) -> Result<(), Error> {
-    study_plan::check_range("trial_budget", i64::from(trial_budget), 1, 10_000)?;
+    study_plan::check_range("number_of_trials", i64::from(number_of_trials), 1, 10_000)?;
     let limits = StudyLimits {
         name: study.plan.name.clone(),
         priority: study.plan.priority,
         parallel_trials: study.plan.parallel_trials,
-        trial_budget,
+        number_of_trials,
     };
     studies::set_limits(writer, study.id, &limits).await?;
     if state != study.state && !studies::set_state(writer, study, state, "The study was extended.").await? {
@@ -193,13 +193,13 @@ pub struct StudyClone {
     pub seed: Option<u64>,
     /// Number of trials.
     #[serde(default)]
-    pub trial_budget: Option<u32>,
+    pub number_of_trials: Option<u32>,
     /// Whether to solve with muscles.
     #[serde(default)]
     pub muscles: Option<bool>,
     /// Who answers comparisons.
     #[serde(default)]
-    pub feedback_mode: Option<FeedbackMode>,
+    pub answer_source: Option<AnswerSource>,
     /// Whether to start the study immediately.
     #[serde(default)]
     pub start: bool,
@@ -214,9 +214,9 @@ pub async fn clone_study(writer: &mut Writer, actor: &Actor, id: StudyId, clone:
     let mut new = study_plan::NewStudy::like(&from.plan);
     new.name = Some(clone.name.clone().unwrap_or_else(|| clone_name(&from.plan.name)));
     new.seed = clone.seed.unwrap_or(new.seed);
-    new.trial_budget = clone.trial_budget.unwrap_or(new.trial_budget);
+    new.number_of_trials = clone.number_of_trials.unwrap_or(new.number_of_trials);
     new.muscles = clone.muscles.unwrap_or(new.muscles);
-    new.feedback_mode = clone.feedback_mode.unwrap_or(new.feedback_mode);
+    new.answer_source = clone.answer_source.unwrap_or(new.answer_source);
     new.start = clone.start;
     let made = study_plan::create_from(writer, actor, new, Some(id)).await?;
     // The set-up of a restricted study stays visible to its members only.

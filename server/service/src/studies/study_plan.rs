@@ -1,6 +1,6 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
-use super::search_space::{self, RequestedSearchSpace};
+use super::bound_grid::{self, RequestedSearchSpace};
 use super::subject::{self, NewSubject};
 use super::{built_in_entries, membership, study_plan_schemas};
 use crate::access::{Caller, Reach};
@@ -9,7 +9,7 @@ use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{Evaluation, FeedbackMode, Study, StudyPlan, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -39,34 +39,34 @@ pub struct NewStudy {
     pub muscles: bool,
     /// Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::GaitSettings)]
+    #[schema(value_type = study_plan_schemas::GaitSettingsSchema)]
     pub gait_settings: Box<GaitSettings>,
     /// Options of the solver: limits, tolerance, initial guesses and retries.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::SolveOptions)]
+    #[schema(value_type = study_plan_schemas::SolveOptionsSchema)]
     pub solve_options: SolveOptions,
     /// Values of the bounds that are not tuned.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::Bounds)]
+    #[schema(value_type = study_plan_schemas::BoundsSchema)]
     pub base_bounds: TunedBounds,
     /// Tuned bounds and their values. Table I of the paper by default.
     #[serde(default)]
-    #[schema(value_type = Option<study_plan_schemas::SearchSpace>)]
+    #[schema(value_type = Option<study_plan_schemas::SearchSpaceSchema>)]
     pub search_space: Option<RequestedSearchSpace>,
     /// Settings of the learner. Settings that are absent take the values recommended for the chosen `method`.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::LearnerSettings)]
+    #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     pub learner: LearnerSettings,
     /// Who answers comparisons.
-    #[serde(default = "automatic")]
-    pub feedback_mode: FeedbackMode,
+    #[serde(default = "gait_rmse")]
+    pub answer_source: AnswerSource,
     /// What evaluates trials.
     #[serde(default = "optimizer")]
     pub evaluation: Evaluation,
     /// Number of trials.
     #[serde(default = "fifteen")]
     #[schema(minimum = 1, maximum = 10000)]
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     #[serde(default)]
     pub solve_seconds_budget: Option<f64>,
@@ -101,8 +101,8 @@ pub struct NewStudy {
 fn yes() -> bool {
     true
 }
-fn automatic() -> FeedbackMode {
-    FeedbackMode::Automatic
+fn gait_rmse() -> AnswerSource {
+    AnswerSource::GaitRmse
 }
 fn optimizer() -> Evaluation {
     Evaluation::Optimizer
@@ -134,9 +134,9 @@ impl NewStudy {
             base_bounds: TunedBounds::default(),
             search_space: None,
             learner: LearnerSettings::default(),
-            feedback_mode: FeedbackMode::Automatic,
+            answer_source: AnswerSource::GaitRmse,
             evaluation: Evaluation::Optimizer,
-            trial_budget: fifteen(),
+            number_of_trials: fifteen(),
             solve_seconds_budget: None,
             unchanged_limit: None,
             repeat_results: None,
@@ -164,9 +164,9 @@ impl NewStudy {
             base_bounds: plan.base_bounds,
             search_space: Some(plan.search_space.clone().into()),
             learner: plan.learner.clone(),
-            feedback_mode: plan.feedback_mode,
+            answer_source: plan.answer_source,
             evaluation: plan.evaluation,
-            trial_budget: plan.trial_budget,
+            number_of_trials: plan.number_of_trials,
             solve_seconds_budget: plan.solve_seconds_budget,
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
@@ -306,7 +306,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     };
     let search_space = match new.search_space {
         Some(given) => given.checked()?,
-        None => search_space::table_i().map_err(Error::Learner)?,
+        None => bound_grid::table_i().map_err(Error::Learner)?,
     };
     let plan = StudyPlan {
         name,
@@ -319,9 +319,9 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
         solve_options: new.solve_options,
         base_bounds: new.base_bounds,
         search_space,
-        feedback_mode: new.feedback_mode,
+        answer_source: new.answer_source,
         evaluation: new.evaluation,
-        trial_budget: new.trial_budget,
+        number_of_trials: new.number_of_trials,
         solve_seconds_budget: new.solve_seconds_budget,
         unchanged_limit: new.unchanged_limit,
         repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
@@ -341,7 +341,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     printable::name("name", &plan.name, LONGEST_NAME)?;
-    check_range("trial_budget", i64::from(plan.trial_budget), 1, 10_000)?;
+    check_range("number_of_trials", i64::from(plan.number_of_trials), 1, 10_000)?;
     check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(plan.priority), -10, 10)?;
     if plan.solve_seconds_budget.is_some_and(|seconds| !(1.0..=1e8).contains(&seconds)) {
@@ -357,7 +357,7 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     plan.gait_settings.validate().map_err(within("gait_settings"))?;
     plan.solve_options.validate().map_err(within("solve_options"))?;
     plan.base_bounds.validate().map_err(within("base_bounds"))?;
-    search_space::validate(&plan.search_space, plan.base_bounds)?;
+    bound_grid::validate(&plan.search_space, plan.base_bounds)?;
     check_learner(&plan.learner)?;
     if plan.learner.categories() != 2 {
         let allowed = "one threshold, because a trial is either converged or not converged";

@@ -6,30 +6,36 @@ use utoipa::ToSchema;
 
 /// Settings of the gait problem.
 #[derive(Debug, ToSchema)]
-pub struct GaitSettings(pub BTreeMap<String, Value>);
+#[schema(as = GaitSettings)]
+pub struct GaitSettingsSchema(pub BTreeMap<String, Value>);
 
 /// Options of the solver: limits, tolerance, initial guesses and retries.
 #[derive(Debug, ToSchema)]
-pub struct SolveOptions(pub BTreeMap<String, Value>);
+#[schema(as = SolveOptions)]
+pub struct SolveOptionsSchema(pub BTreeMap<String, Value>);
 
 /// Settings of the learner.
 #[derive(Debug, ToSchema)]
-pub struct LearnerSettings(pub BTreeMap<String, Value>);
+#[schema(as = LearnerSettings)]
+pub struct LearnerSettingsSchema(pub BTreeMap<String, Value>);
 
 /// Values of the bounds a1 to a8.
 #[derive(Debug, ToSchema)]
-pub struct Bounds(pub BTreeMap<String, Value>);
+#[schema(as = Bounds)]
+pub struct BoundsSchema(pub BTreeMap<String, Value>);
 
 /// A grid of actions.
 #[derive(Debug, ToSchema)]
-pub struct SearchSpace {
+#[schema(as = SearchSpace)]
+pub struct SearchSpaceSchema {
     /// One dimension for each tuned bound.
-    pub dimensions: Vec<Dimension>,
+    pub dimensions: Vec<DimensionSchema>,
 }
 
 /// One tuned bound of a search space.
 #[derive(Debug, ToSchema)]
-pub struct Dimension {
+#[schema(as = Dimension)]
+pub struct DimensionSchema {
     /// Name of the bound.
     pub name: String,
     /// Values of the bound, in its unit, ascending.

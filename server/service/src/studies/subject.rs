@@ -109,7 +109,7 @@ pub async fn correct(
 ) -> Result<Correction, Error> {
     let before = subjects::get(writer, id).await?.body();
     let body = Body::new(new.height_m, new.body_mass_kg)?;
-    let reason = printable::reason("reason", &new.reason, " that say why the values are corrected")?;
+    let reason = printable::reason("reason", &new.reason, ", the reason for the correction")?;
     if body == before {
         return Err(Error::conflict("Height and mass already have these values."));
     }

@@ -1,6 +1,6 @@
 //! Records suggestions (coactive feedback): bounds with which a gait would have been better than that of a trial.
 
-use super::answer::{attribution, comparable};
+use super::pair_answer::{attribution, comparable};
 use super::preference;
 use crate::access::Caller;
 use crate::error::Error;

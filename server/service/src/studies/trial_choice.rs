@@ -1,9 +1,9 @@
 //! Chooses the next trial and the best trial of a study, as pure functions of its snapshot.
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
+use super::bound_grid;
 use super::equal_actions::equal_actions;
 use super::ranking::{by_mean, ranking};
-use super::search_space;
 use super::seed::{Purpose, derive};
 use super::snapshot::StudySnapshot;
 use gait_learner::{LearnerError, Posterior, ProposalReason, propose, propose_outside};
@@ -36,7 +36,7 @@ impl ChoiceError {
 ///
 /// # Errors
 /// [`ChoiceError`], even if every action was tried.
-pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> Result<NewTrial, ChoiceError> {
+pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, posterior: &Posterior) -> Result<NewTrial, ChoiceError> {
     let plan = &snapshot.study.plan;
     let number = snapshot.trials.last().map_or(1, |trial| trial.number + 1);
     if plan.warm_start_from == WarmStartFrom::Root && snapshot.trials.is_empty() {
@@ -54,22 +54,22 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, belief: &Posterior) -> R
     Ok(NewTrial {
         number,
         action_index: proposal.action,
-        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
         reason: reason_in_words(proposal.reason, snapshot.has_best_action()),
         best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
-        warm_started_from: warm_start_of_next(snapshot, belief)?,
+        warm_started_from: warm_start_of_next(snapshot, posterior)?,
     })
 }
 
 /// The trial of the root gait: the action nearest to the bounds that the study starts from.
 fn root(snapshot: &StudySnapshot) -> Result<NewTrial, ChoiceError> {
     let plan = &snapshot.study.plan;
-    let action_index = search_space::nearest_action(&plan.search_space, plan.base_bounds)?;
+    let action_index = bound_grid::nearest_action(&plan.search_space, plan.base_bounds)?;
     Ok(NewTrial {
         number: 1,
         action_index,
-        action: search_space::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
-        reason: "nearest to the default bounds: its gait is the root of all others".to_owned(),
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
+        reason: "nearest to the default bounds: its gait is the root gait".to_owned(),
         best_before: None,
         warm_started_from: None,
     })
@@ -79,9 +79,9 @@ fn root(snapshot: &StudySnapshot) -> Result<NewTrial, ChoiceError> {
 ///
 /// # Errors
 /// When a trial's action is not in the search space.
-pub fn warm_start_of_next(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+pub fn warm_start_of_next(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Option<TrialId>, LearnerError> {
     match snapshot.study.plan.warm_start_from {
-        WarmStartFrom::Incumbent => best_converged(snapshot, belief),
+        WarmStartFrom::Incumbent => best_converged(snapshot, posterior),
         WarmStartFrom::Root => Ok(root_trial(snapshot)),
     }
 }
@@ -100,16 +100,16 @@ pub fn awaits_root(snapshot: &StudySnapshot) -> bool {
 ///
 /// # Errors
 /// When a trial's action is not in the search space.
-pub fn best_converged(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
-    Ok(by_mean(snapshot, belief, |_| true)?.first().copied())
+pub fn best_converged(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(by_mean(snapshot, posterior, |_| true)?.first().copied())
 }
 
 /// The recommended trial: the one with the highest posterior mean among gaits without a safety report in force.
 ///
 /// # Errors
 /// As [`best_converged`].
-pub fn best_trial(snapshot: &StudySnapshot, belief: &Posterior) -> Result<Option<TrialId>, LearnerError> {
-    Ok(ranking(snapshot, belief)?.first().copied())
+pub fn best_trial(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Option<TrialId>, LearnerError> {
+    Ok(ranking(snapshot, posterior)?.first().copied())
 }
 
 /// From this number of trials on, pages show the last known best trial instead of computing the posterior.
@@ -122,16 +122,16 @@ pub const MANY: usize = 400;
 pub fn ranking_to_show(
     pool: &OnPool,
     snapshot: &StudySnapshot,
-    beliefs: &Beliefs,
+    analyses: &Analyses,
 ) -> Result<Vec<TrialId>, LearnerError> {
     if snapshot.trials.len() >= MANY {
-        return Ok(last_believed(snapshot).into_iter().collect());
+        return Ok(last_known_best(snapshot).into_iter().collect());
     }
-    ranking(snapshot, &*beliefs.posterior(pool, snapshot)?)
+    ranking(snapshot, &*analyses.posterior(pool, snapshot)?)
 }
 
 /// The trial that was best at the newest proposal, if its gait has no safety report in force. Needs only the newest trials.
-pub fn last_believed(snapshot: &StudySnapshot) -> Option<TrialId> {
+pub fn last_known_best(snapshot: &StudySnapshot) -> Option<TrialId> {
     let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
     (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.forbids(best)).then_some(best.id)
 }

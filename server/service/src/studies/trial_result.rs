@@ -4,13 +4,13 @@
 use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
 use super::snapshot::StudySnapshot;
-use super::trial_state::{self, TrialEvent};
+use super::trial_transitions::{self, TrialEvent};
 use crate::error::Error;
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::gaits::PackedGait;
 use gaitwright_store::jobs::{FailureCounts, Lease};
-use gaitwright_store::studies::FeedbackMode;
+use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{TrialEnd, TrialState};
 use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, jobs, studies, trials};
 use serde_json::json;
@@ -33,7 +33,7 @@ pub async fn ended(
     outcome: &SolveOutcome,
     gait: Option<&PackedGait>,
 ) -> Result<bool, Error> {
-    let Some(state) = trial_state::result_of(outcome.report.status) else {
+    let Some(state) = trial_transitions::result_of(outcome.report.status) else {
         return match outcome.report.status {
             SolveStatus::Cancelled => interrupted(store, lease).await,
             _ => broke(store, lease, "The solve ran out of time.").await,
@@ -123,7 +123,8 @@ pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
 /// [`Error::Conflict`] if the trial has ended; errors of the database.
 pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
-    let state = trial_state::after(row.state, TrialEvent::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
+    let state =
+        trial_transitions::after(row.state, TrialEvent::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
     jobs::cancel(writer, trial).await?;
     let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
     trials::finish(writer, trial, &end).await?;
@@ -137,7 +138,7 @@ pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Res
 /// [`Error::Conflict`] if the trial is open or has a result; errors of the database.
 pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
     let row = trials::get(writer, trial).await?;
-    trial_state::after(row.state, TrialEvent::Retried).map_err(|e| Error::conflict(e.to_string()))?;
+    trial_transitions::after(row.state, TrialEvent::Retried).map_err(|e| Error::conflict(e.to_string()))?;
     if row.script.is_some() {
         return Err(Error::conflict(
             "A script evaluates this trial, so it cannot be queued again. The script must ask for another trial.",
@@ -159,7 +160,7 @@ async fn give_up_or_requeue(
     if !jobs::finish(writer, lease).await? {
         return Ok(false);
     }
-    let state = trial_state::after(TrialState::Running, event).map_err(|e| Error::Internal(e.to_string()))?;
+    let state = trial_transitions::after(TrialState::Running, event).map_err(|e| Error::Internal(e.to_string()))?;
     if state == TrialState::Queued {
         jobs::requeue(writer, lease.job, after).await?;
         trials::requeue(writer, lease.trial, reason).await?;
@@ -180,7 +181,7 @@ async fn answers(
 ) -> Result<Vec<FeedbackContent>, Error> {
     let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
     let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
-    if snapshot.study.plan.feedback_mode == FeedbackMode::Human {
+    if snapshot.study.plan.answer_source == AnswerSource::People {
         return Ok(Vec::new());
     }
     let standing_there = snapshot.clone();
@@ -203,9 +204,9 @@ fn message_of(outcome: &SolveOutcome) -> String {
     let cause = match outcome.report.status {
         SolveStatus::Converged => return String::new(),
         SolveStatus::Infeasible => "No gait near the last motion tried satisfies all constraints.",
-        SolveStatus::Stalled => "The solver stalled.",
-        SolveStatus::IterationLimit => "The solver reached the iteration limit.",
-        SolveStatus::TimeLimit => "The solver reached the time limit.",
+        SolveStatus::Stalled => "The optimiser stalled.",
+        SolveStatus::IterationLimit => "The optimiser reached the iteration limit.",
+        SolveStatus::TimeLimit => "The optimiser reached the time limit.",
         SolveStatus::Cancelled => "The solve was cancelled.",
     };
     match worst {

@@ -43,7 +43,7 @@ impl TrialJob for WalkSimulator {
         let requested = execution_reports::requested(&mut *self.store.read().await?).await?;
         Ok(requested
             .into_iter()
-            .map(|(trial, walks, seed)| (trial, NewExecutionReport { walks, seed }.into()))
+            .map(|(trial, simulated_walks, seed)| (trial, NewExecutionReport { simulated_walks, seed }.into()))
             .collect())
     }
 

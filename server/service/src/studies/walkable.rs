@@ -5,7 +5,7 @@
 
 use super::safety_reports::SafetyReports;
 use super::same_motion::is_same_gait;
-use super::trial_state::has_state;
+use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::export::ControllerFile;
@@ -99,7 +99,7 @@ pub enum NotWalkable {
     },
     /// The gait has a safety report in force.
     #[error(
-        "The gait of trial {number} was reported as unsafe by {by}. Nobody may walk with it until staff have cleared it."
+        "The gait of trial {number} was reported as unsafe by {by}. Do not walk with it until staff have cleared it."
     )]
     ReportedUnsafe {
         /// Number of the trial.
@@ -109,8 +109,8 @@ pub enum NotWalkable {
     },
     /// Another trial of the subject has the same gait, which has a safety report in force.
     #[error(
-        "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. Nobody may walk with it until \
-         staff have cleared it there."
+        "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. Do not walk with it until staff \
+         have cleared {other}."
     )]
     SameGaitReportedUnsafe {
         /// Number of the trial.

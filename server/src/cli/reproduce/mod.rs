@@ -1,6 +1,6 @@
 //! `gaitwright reproduce`: repeats the paper's comparison of gaits with and without muscles, unattended.
 
-mod report;
+mod report_page;
 mod statements;
 mod variants;
 
@@ -15,7 +15,7 @@ use gait_optimizer::{ReferenceGait, Subject};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::Beliefs;
+use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::certified_best::BestCertification;
 use gaitwright_service::studies::history;
@@ -56,7 +56,7 @@ fn seeds(text: &str) -> Result<u64, String> {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Reproduce {
+pub(super) struct ReproduceCommand {
     /// Subjects from the paper.
     #[arg(long, value_enum, default_value = "both")]
     subject: Subjects,
@@ -77,7 +77,7 @@ pub(super) struct Reproduce {
     folder: PathBuf,
 }
 
-impl Reproduce {
+impl ReproduceCommand {
     /// Runs two studies for each subject and seed, one trial at a time, so that results are reproducible bit for bit.
     pub(super) async fn run(self) -> Result<CommandEnd, Error> {
         let reference = reference_of(self.reference.as_deref())?;
@@ -94,7 +94,7 @@ impl Reproduce {
             return Ok(CommandEnd::Interrupted);
         };
         let texts = [
-            report::html(&outcomes, self.trials)?,
+            report_page::html(&outcomes, self.trials)?,
             variants::iterations_csv(&outcomes),
             variants::studies_csv(&outcomes),
             variants::angles_csv(&outcomes),
@@ -128,7 +128,7 @@ impl Reproduce {
                     let title = format!("subject {subject}, {words} muscles, seed {seed}");
                     tell(&title);
                     let (study, finished) = Box::pin(self.study(store, subject, muscles, seed, reference)).await?;
-                    let (snapshot, beliefs) = if finished {
+                    let (snapshot, analyses) = if finished {
                         (StudySnapshot::read(&mut *store.read().await?, study).await?, Arc::default())
                     } else {
                         let ran = unattended::run(store, &study, 1, Lines::Progress).await?;
@@ -139,12 +139,12 @@ impl Reproduce {
                             let why = unattended::failure(&ran.snapshot).unwrap_or_default();
                             return Err(Error::Internal(format!("{title}: {why}. The comparison was stopped.")));
                         }
-                        (ran.snapshot, ran.beliefs)
+                        (ran.snapshot, ran.analyses)
                     };
                     failures.extend(unattended::failure(&snapshot).map(|failure| format!("{title}: {failure}")));
-                    let certification = unattended::certified(store, &snapshot, &beliefs).await?;
+                    let certification = unattended::certified(store, &snapshot, &analyses).await?;
                     outcomes.push(
-                        outcome(store, subject, muscles, seed, &snapshot, &beliefs, certification, reference).await?,
+                        outcome(store, subject, muscles, seed, &snapshot, &analyses, certification, reference).await?,
                     );
                 }
             }
@@ -167,7 +167,7 @@ impl Reproduce {
         let person = built_in_entries::subject_with(&mut writer, Subject::builtin(subject)?).await?;
         let new = NewStudy {
             muscles,
-            trial_budget: self.trials,
+            number_of_trials: self.trials,
             seed,
             parallel_trials: 1,
             repeat_results: Some(true),
@@ -196,12 +196,12 @@ async fn outcome(
     muscles: bool,
     seed: u64,
     snapshot: &StudySnapshot,
-    beliefs: &Arc<Beliefs>,
+    analyses: &Arc<Analyses>,
     certification: BestCertification,
     reference: &ReferenceGait,
 ) -> Result<ReproducedStudy, Error> {
-    let (there, beliefs) = (snapshot.clone(), Arc::clone(beliefs));
-    let choose = move |pool: &OnPool| best_trial(&there, &*beliefs.posterior(pool, &there)?);
+    let (there, analyses) = (snapshot.clone(), Arc::clone(analyses));
+    let choose = move |pool: &OnPool| best_trial(&there, &*analyses.posterior(pool, &there)?);
     let best = store.compute(choose).await?.map_err(Error::Learner)?;
     let milestones = history::of(snapshot, best);
     let best = best.and_then(|id| snapshot.trial(id));

@@ -1,19 +1,19 @@
 //! Settings of the service: flags override the environment, which overrides the settings file, which overrides
 //! defaults. Each value has its origin.
 
-mod file;
 mod flags;
 mod known_settings;
 mod setting_origin;
+mod settings_file;
 mod values;
 
 pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
 
 use super::output::data;
-use file::{parse, read};
 use gaitwright_service::error::Error;
 use known_settings::KNOWN;
 use setting_origin::SettingOrigin;
+use settings_file::{parse, read};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;

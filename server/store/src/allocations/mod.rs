@@ -27,7 +27,7 @@ pub async fn of_session(
     random: RandomDraw,
 ) -> StoreResult<()> {
     let gait_a_first = random.gait_a_first(lead(db, number).await?);
-    sqlx::query("insert into lab_allocations (session_id, gait_a_first, nonce, created_at) values (?, ?, ?, ?)")
+    sqlx::query("insert into lab_allocations (lab_session_id, gait_a_first, nonce, created_at) values (?, ?, ?, ?)")
         .bind(session)
         .bind(gait_a_first)
         .bind(random.nonce())
@@ -43,8 +43,8 @@ pub async fn of_session(
 async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
     let row = sqlx::query(
         "select coalesce(sum(2 * a.gait_a_first - 1), 0) from lab_sessions l \
-         join lab_session_steps t on t.session_id = l.id and t.step = 'unblinded' \
-         join lab_allocations a on a.session_id = l.id \
+         join lab_session_steps t on t.lab_session_id = l.id and t.step = 'unblinded' \
+         join lab_allocations a on a.lab_session_id = l.id \
          where l.number = ? and l.study_id not in (select study_id from imports)",
     );
     Ok(row.bind(number).fetch_one(db).await?.try_get(0)?)
@@ -81,13 +81,13 @@ pub struct ControllerFileDownload {
 /// Errors of the database.
 pub async fn session(db: &mut Connection, id: LabSessionId) -> StoreResult<SessionAllocation> {
     let order = sqlx::query(
-        "select iif(exists (select 1 from lab_session_steps t where t.session_id = a.session_id and t.step = 'unblinded'), \
-         a.gait_a_first, null) from lab_allocations a where a.session_id = ?",
+        "select iif(exists (select 1 from lab_session_steps t where t.lab_session_id = a.lab_session_id and t.step = 'unblinded'), \
+         a.gait_a_first, null) from lab_allocations a where a.lab_session_id = ?",
     );
     let order = order.bind(id).fetch_optional(&mut *db).await?;
     let included = order.is_some();
     let gait_a_first = order.map(|row| row.try_get(0)).transpose()?.flatten();
-    let files = sqlx::query("select * from controller_file_downloads where session_id = ? order by id").bind(id);
+    let files = sqlx::query("select * from controller_file_downloads where lab_session_id = ? order by id").bind(id);
     let files = files.fetch_all(db).await?.iter().map(controller_file).collect::<StoreResult<_>>()?;
     Ok(SessionAllocation { included, gait_a_first, files })
 }
@@ -114,7 +114,7 @@ pub async fn for_device(
 ) -> StoreResult<Option<bool>> {
     let id = ControllerFileDownloadId::fresh();
     sqlx::query(
-        "insert into controller_file_downloads (id, session_id, walk, to_device, actor, created_at) values (?, ?, ?, ?, ?, ?)",
+        "insert into controller_file_downloads (id, lab_session_id, walk, to_device, actor, created_at) values (?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(session)
@@ -126,7 +126,7 @@ pub async fn for_device(
     .await?;
     let row = sqlx::query(
         "select a.gait_a_first = (f.walk = 2) from lab_allocations a \
-         join controller_file_downloads f on f.session_id = a.session_id where f.id = ?",
+         join controller_file_downloads f on f.lab_session_id = a.lab_session_id where f.id = ?",
     );
     Ok(row.bind(id).fetch_optional(db).await?.map(|row| row.try_get(0)).transpose()?)
 }
@@ -138,7 +138,7 @@ pub async fn for_device(
 /// Errors of the database.
 pub async fn has_file(db: &mut Connection, study: StudyId, actor: &Actor) -> StoreResult<bool> {
     let row = sqlx::query(
-        "select 1 from controller_file_downloads f join lab_sessions l on l.id = f.session_id \
+        "select 1 from controller_file_downloads f join lab_sessions l on l.id = f.lab_session_id \
          where l.study_id = ?1 and (f.actor = ?2 or ?3 or f.actor glob ?4) and f.to_device = 0 limit 1",
     );
     let (is_token, of_tokens) = (Actor::is_token(actor.as_str()), format!("{}*", Actor::OF_TOKENS));
@@ -197,12 +197,12 @@ impl PairWithSides {
     }
 }
 
-/// The pair with this token, if it belongs to the rater.
+/// The pair with this code, if it belongs to the rater.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreResult<Option<PairWithSides>> {
-    let found = sided("where p.token = ? and p.rater = ?", &[token, rater], db).await?;
+pub async fn own_pair(db: &mut Connection, code: &str, rater: &str) -> StoreResult<Option<PairWithSides>> {
+    let found = sided("where p.code = ? and p.rater = ?", &[code, rater], db).await?;
     Ok(found.into_iter().next())
 }
 
@@ -212,7 +212,7 @@ pub async fn own_pair(db: &mut Connection, token: &str, rater: &str) -> StoreRes
 /// Errors of the database.
 pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<PairWithSides>> {
     let rest = "where p.study_id = ? and exists \
-                (select 1 from unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
+                (select 1 from rater_unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
     sided(rest, &[&study.to_string()], db).await
 }
 

@@ -64,7 +64,7 @@ pub enum FeedbackContent {
         loser: TrialId,
     },
     /// Two trials are equally good.
-    Tie {
+    NoDifference {
         /// One trial.
         a: TrialId,
         /// The other trial.

@@ -84,7 +84,7 @@ pub async fn append(
     let (kind, a, b, category, suggested) = match *content {
         FeedbackContent::Label { trial, category } => ("label", trial, None, Some(category), None),
         FeedbackContent::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
-        FeedbackContent::Tie { a, b } => ("tie", a, Some(b), None, None),
+        FeedbackContent::NoDifference { a, b } => ("no_difference", a, Some(b), None, None),
         FeedbackContent::Suggestion { suggested, over } => {
             ("suggestion", over, None, None, Some(i64::try_from(suggested.0).unwrap_or(i64::MAX)))
         }
@@ -115,7 +115,7 @@ pub async fn append(
 /// Errors of the database.
 pub async fn retract(db: &mut Connection, row: &FeedbackRow, author: &str, reason: &str) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into retractions (feedback_seq, author, reason, created_at) values (?, ?, ?, ?) \
+        "insert into feedback_retractions (feedback_seq, author, reason, created_at) values (?, ?, ?, ?) \
          on conflict (feedback_seq) do nothing",
     )
     .bind(row.seq)
@@ -132,7 +132,7 @@ const SELECT: &str = "select f.*, r.author as retracted_by, r.reason as retracte
                       r.created_at as retracted_at, \
                       p.pair_id is not null as by_rater, \
                       coalesce(p.could_have_known, 0) or coalesce(q.unblinded, 0) as could_have_known \
-                      from feedback f left join retractions r on r.feedback_seq = f.seq \
+                      from feedback f left join feedback_retractions r on r.feedback_seq = f.seq \
                       left join blind_pair_answers p on p.feedback_id = f.id \
                       left join blind_pairs q on q.id = p.pair_id ";
 
@@ -161,7 +161,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId, after: i64) -> StoreR
     read_many(&query.fetch_all(db).await?, from_row).await
 }
 
-/// At most `limit` preferences and ties of a study after a sequence number, retracted ones included, in order.
+/// At most `limit` preferences of a study after a sequence number, retracted ones included, in order.
 ///
 /// # Errors
 /// Errors of the database.
@@ -227,7 +227,7 @@ pub async fn of_pair(
         "where f.seq in (select o.seq from feedback o \
          where ((o.trial_a = ?1 and o.trial_b = ?2) or (o.trial_a = ?2 and o.trial_b = ?1)) \
          and (?3 is null or o.author <> ?3) and o.source in ('subject', 'clinician', 'script') \
-         and not exists (select 1 from retractions where feedback_seq = o.seq) order by o.seq desc limit ?4) \
+         and not exists (select 1 from feedback_retractions where feedback_seq = o.seq) order by o.seq desc limit ?4) \
          order by f.seq desc",
     ))
     .bind(a)
@@ -251,7 +251,7 @@ pub async fn authors_of_pair(
         "select f.id, f.author from feedback f \
          where ((f.trial_a = ?1 and f.trial_b = ?2) or (f.trial_a = ?2 and f.trial_b = ?1)) \
          and f.source in ('subject', 'clinician', 'script') \
-         and not exists (select 1 from retractions r where r.feedback_seq = f.seq) \
+         and not exists (select 1 from feedback_retractions r where r.feedback_seq = f.seq) \
          and not exists (select 1 from blind_pair_answers p where p.feedback_id = f.id) order by f.seq desc",
     )
     .bind(a)
@@ -264,7 +264,7 @@ pub async fn authors_of_pair(
 const SUGGESTIONS_BETWEEN: &str = "select f.id, f.author from feedback f indexed by feedback_suggestions \
      join trials t on t.id = f.trial_a where f.study_id = ?1 and f.kind = 'suggestion' and f.suggested in (?2, ?3) \
      and ((f.suggested = ?2 and t.action_index = ?3) or (f.suggested = ?3 and t.action_index = ?2)) \
-     and not exists (select 1 from retractions r where r.feedback_seq = f.seq) order by f.seq desc";
+     and not exists (select 1 from feedback_retractions r where r.feedback_seq = f.seq) order by f.seq desc";
 
 /// The authors of suggestions that prefer one of two actions of a study to the other, newest first, without retracted
 /// ones.
@@ -295,7 +295,7 @@ pub struct LogVersion {
 pub async fn version(db: &mut Connection, study: StudyId) -> StoreResult<LogVersion> {
     let row = sqlx::query(
         "select coalesce(max(f.seq), 0) as last, count(r.feedback_seq) as retracted \
-         from feedback f left join retractions r on r.feedback_seq = f.seq where f.study_id = ?",
+         from feedback f left join feedback_retractions r on r.feedback_seq = f.seq where f.study_id = ?",
     )
     .bind(study)
     .fetch_one(db)
@@ -321,7 +321,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
     let content = match (kind, b, category, suggested) {
         ("label", None, Some(category), None) => FeedbackContent::Label { trial: a, category },
         ("preference", Some(loser), None, None) => FeedbackContent::Preference { winner: a, loser },
-        ("tie", Some(b), None, None) => FeedbackContent::Tie { a, b },
+        ("no_difference", Some(b), None, None) => FeedbackContent::NoDifference { a, b },
         ("suggestion", None, None, Some(index)) => {
             FeedbackContent::Suggestion { suggested: ActionIndex(u64::try_from(index).unwrap_or(0)), over: a }
         }

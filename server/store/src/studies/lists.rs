@@ -87,7 +87,7 @@ pub async fn is_named(db: &mut Connection, reach: Reach, name: &str, except: Opt
 pub async fn awaiting_raters(db: &mut Connection, reach: Reach) -> StoreResult<Vec<Study>> {
     let (every, open, principal) = reach_values(reach);
     let sql = concat!(
-        "select * from studies where state in ('running', 'waiting') and feedback_mode <> 'automatic' and ",
+        "select * from studies where state in ('running', 'waiting') and answer_source <> 'gait_rmse' and ",
         reached!("id"),
         " order by priority desc, id"
     );
@@ -128,7 +128,7 @@ macro_rules! reported {
          and m.id not in (select assessment_id from assessment_retractions) \
          union select p.study_id from blind_pairs p join blind_pair_answers a on a.pair_id = p.id \
          where a.answer glob 'unsafe*' \
-         union select l.study_id from lab_sessions l join lab_answers a on a.session_id = l.id \
+         union select l.study_id from lab_sessions l join lab_answers a on a.lab_session_id = l.id \
          where a.answer glob 'unsafe*'"
     };
 }

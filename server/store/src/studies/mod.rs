@@ -2,14 +2,14 @@
 
 mod lists;
 mod plan;
-mod state;
+mod study_state;
 
 pub use lists::{
     StudyFilter, active, awaiting_raters, ended_before, is_named, of_subject, of_subject_with_safety_reports, open_of,
     page, tags, waiting_for_people, with_safety_reports,
 };
-pub use plan::{Evaluation, FeedbackMode, StudyPlan, WarmStartFrom};
-pub use state::StudyState;
+pub use plan::{AnswerSource, Evaluation, StudyPlan, WarmStartFrom};
+pub use study_state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
 use gait_optimizer::Subject as Body;
@@ -58,7 +58,7 @@ pub async fn insert(
     let id = StudyId::fresh();
     sqlx::query(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
-         solve_options, base_bounds, search_space, learner, feedback_mode, trial_budget, parallel_trials, priority, \
+         solve_options, base_bounds, search_space, learner, answer_source, number_of_trials, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, cloned_from, created_at, updated_at, \
          height_m, body_mass_kg, repeat_results, warm_start_from) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
@@ -73,8 +73,8 @@ pub async fn insert(
     .bind(json_columns::to_text("base bounds", &plan.base_bounds)?)
     .bind(json_columns::to_text("search space", &plan.search_space)?)
     .bind(json_columns::to_text("learner settings", &plan.learner)?)
-    .bind(plan.feedback_mode.as_str())
-    .bind(plan.trial_budget)
+    .bind(plan.answer_source.as_str())
+    .bind(plan.number_of_trials)
     .bind(plan.parallel_trials)
     .bind(plan.priority)
     .bind(i64::try_from(plan.seed).unwrap_or(i64::MAX))
@@ -125,7 +125,7 @@ pub struct StudyLimits {
     /// Number of trials that run in parallel.
     pub parallel_trials: u32,
     /// Number of trials.
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
 }
 
 /// Updates the changeable fields.
@@ -134,13 +134,13 @@ pub struct StudyLimits {
 /// A violated constraint; errors of the database.
 pub async fn set_limits(db: &mut Connection, id: StudyId, limits: &StudyLimits) -> StoreResult<()> {
     sqlx::query(
-        "update studies set name = ?, priority = ?, parallel_trials = ?, trial_budget = ?, revision = revision + 1, \
+        "update studies set name = ?, priority = ?, parallel_trials = ?, number_of_trials = ?, revision = revision + 1, \
          updated_at = ? where id = ?",
     )
     .bind(&limits.name)
     .bind(limits.priority)
     .bind(limits.parallel_trials)
-    .bind(limits.trial_budget)
+    .bind(limits.number_of_trials)
     .bind(now())
     .bind(id)
     .execute(db)
@@ -204,9 +204,9 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             base_bounds: json_columns::column(row, "base_bounds")?,
             search_space: json_columns::column(row, "search_space")?,
             learner: json_columns::column(row, "learner")?,
-            feedback_mode: row.try_get::<&str, _>("feedback_mode")?.parse()?,
+            answer_source: row.try_get::<&str, _>("answer_source")?.parse()?,
             evaluation: row.try_get::<&str, _>("evaluation")?.parse()?,
-            trial_budget: row.try_get("trial_budget")?,
+            number_of_trials: row.try_get("number_of_trials")?,
             solve_seconds_budget: row.try_get("solve_seconds_budget")?,
             unchanged_limit: row.try_get("unchanged_limit")?,
             repeat_results: row.try_get("repeat_results")?,

@@ -7,37 +7,37 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Who answers comparisons: `automatic`, Gait RMSE answers every comparison; `human`, people answer, and the study
-/// waits for them; `mixed`, Gait RMSE answers, and people can add answers.
+/// Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study
+/// waits for them; `both`, Gait RMSE answers, and people can add answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum FeedbackMode {
+pub enum AnswerSource {
     /// Gait RMSE answers every comparison.
-    Automatic,
+    GaitRmse,
     /// People answer, and the study waits for them.
-    Human,
+    People,
     /// Gait RMSE answers, and people can add answers.
-    Mixed,
+    Both,
 }
 
-impl FeedbackMode {
+impl AnswerSource {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Automatic => "automatic",
-            Self::Human => "human",
-            Self::Mixed => "mixed",
+            Self::GaitRmse => "gait_rmse",
+            Self::People => "people",
+            Self::Both => "both",
         }
     }
 }
 
-impl FromStr for FeedbackMode {
+impl FromStr for AnswerSource {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Automatic, Self::Human, Self::Mixed]
+        [Self::GaitRmse, Self::People, Self::Both]
             .into_iter()
-            .find(|mode| mode.as_str() == text)
-            .ok_or_else(|| StoreError::unknown_value("feedback mode", text))
+            .find(|source| source.as_str() == text)
+            .ok_or_else(|| StoreError::unknown_value("source of answers", text))
     }
 }
 
@@ -129,11 +129,11 @@ pub struct StudyPlan {
     /// Settings of the learner.
     pub learner: LearnerSettings,
     /// Who answers comparisons.
-    pub feedback_mode: FeedbackMode,
+    pub answer_source: AnswerSource,
     /// What evaluates trials.
     pub evaluation: Evaluation,
     /// Number of trials.
-    pub trial_budget: u32,
+    pub number_of_trials: u32,
     /// Total solve time, s, after which no new trial starts.
     pub solve_seconds_budget: Option<f64>,
     /// The study finishes when the best action has not changed over this many results.

@@ -1,10 +1,10 @@
 //! Stored trials: actions of a study and their results.
 
-mod progress;
-mod state;
+mod trial_counts;
+mod trial_state;
 
-pub use progress::{SolveTimes, TrialCounts, counts, improvements, measured};
-pub use state::TrialState;
+pub use trial_counts::{SolveTimes, TrialCounts, counts, improvements, measured};
+pub use trial_state::TrialState;
 
 use super::many_rows::read_many;
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, TrialId, json_columns, now};
@@ -236,11 +236,11 @@ pub async fn requeue(db: &mut Connection, id: TrialId, message: &str) -> StoreRe
 /// # Errors
 /// A refusal by a trigger if the trial already has a result; errors of the database.
 pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreResult<()> {
-    let figures = end.report.as_ref();
+    let solve_report = end.report.as_ref();
     // A figure that is not finite is stored as null.
-    let finite = |f: fn(&SolveReport) -> f64| figures.map(f).filter(|x| x.is_finite());
-    let status = figures.map(|r| json_columns::to_text("status", &r.status)).transpose()?;
-    let report = figures.map(|r| json_columns::readable("report", r)).transpose()?.flatten();
+    let finite = |f: fn(&SolveReport) -> f64| solve_report.map(f).filter(|x| x.is_finite());
+    let status = solve_report.map(|r| json_columns::to_text("status", &r.status)).transpose()?;
+    let report = solve_report.map(|r| json_columns::readable("report", r)).transpose()?.flatten();
     let violations: Vec<&Violation> = end.violations.iter().filter(|v| v.amount.is_finite()).collect();
     sqlx::query(
         "update trials set state = ?, status = ?, gait_rmse_rad = ?, cost_of_transport = ?, objective = ?, \
@@ -253,7 +253,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     .bind(finite(|r| r.cost_of_transport))
     .bind(finite(|r| r.objective))
     .bind(finite(|r| r.max_violation))
-    .bind(figures.map(|r| i64::try_from(r.iterations).unwrap_or(i64::MAX)))
+    .bind(solve_report.map(|r| i64::try_from(r.iterations).unwrap_or(i64::MAX)))
     .bind(finite(|r| r.seconds_total))
     .bind(report)
     .bind(json_columns::to_text("violations", &violations)?)

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
-    CreatedInvitation,
+    CreatedRaterInvitation,
     CreatedToken,
-    Invitation,
-    Me,
+    CurrentUser,
     Member,
     MemberId,
     NewMember,
     NewRole,
     NewToken,
     NewUser,
+    RaterInvitation,
     Session,
     SessionId,
     SignInLink,
-    StudyAccess,
     StudyId,
+    StudyRestriction,
     Token,
     TokenId,
     User,
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
 class AccessMethods(Transport):
     """Operations with the tag `access`."""
 
-    def get_caller(self) -> Me:
+    def get_caller(self) -> CurrentUser:
         """Get the caller.
 
         Name, role and rights of the caller.
         """
-        return cast(Me, self.request_json("GET", "/api/v1/me"))
+        return cast(CurrentUser, self.request_json("GET", "/api/v1/me"))
 
     def list_sessions(self, *, page_size: Optional[int] = None) -> Pages[Session]:
         """List sign-in sessions.
@@ -67,17 +67,17 @@ class AccessMethods(Transport):
             ),
         )
 
-    def get_study_access(self, study_id: StudyId) -> StudyAccess:
+    def get_study_access(self, study_id: StudyId) -> StudyRestriction:
         """Get the access restriction of a study."""
-        return cast(StudyAccess, self.request_json("GET", "/api/v1/studies/{id}/access", {"id": study_id}))
+        return cast(StudyRestriction, self.request_json("GET", "/api/v1/studies/{id}/access", {"id": study_id}))
 
     def set_study_access(
         self,
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[StudyAccess],
-    ) -> StudyAccess:
+        **body: Unpack[StudyRestriction],
+    ) -> StudyRestriction:
         """Set the access restriction of a study.
 
         Restricts the study to members and administrators, or opens it to all staff. The caller who restricts it becomes
@@ -86,7 +86,7 @@ class AccessMethods(Transport):
         Fields: restricted.
         """
         return cast(
-            StudyAccess,
+            StudyRestriction,
             self.request_json(
                 "PUT",
                 "/api/v1/studies/{id}/access",
@@ -96,7 +96,7 @@ class AccessMethods(Transport):
             ),
         )
 
-    def create_invitation(self, study_id: StudyId, **body: Unpack[Invitation]) -> CreatedInvitation:
+    def create_invitation(self, study_id: StudyId, **body: Unpack[RaterInvitation]) -> CreatedRaterInvitation:
         """Create an invitation of a rater.
 
         Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
@@ -104,7 +104,7 @@ class AccessMethods(Transport):
         Fields: name.
         """
         return cast(
-            CreatedInvitation,
+            CreatedRaterInvitation,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/invitations",

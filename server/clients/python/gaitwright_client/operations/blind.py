@@ -11,11 +11,11 @@ from ..paging import Pages
 from ..schemas import (
     AnswerReceipt,
     BlindMotion,
-    NextPair,
+    NextBlindPair,
     RaterAnswer,
     RaterReliability,
+    RaterUnblinding,
     StudyId,
-    Unblind,
     UnblindedRater,
 )
 from ..transport import Transport
@@ -29,7 +29,7 @@ class BlindMethods(Transport):
 
     def answer_blind_pair(
         self,
-        token: str,
+        code: str,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[RaterAnswer],
@@ -44,14 +44,14 @@ class BlindMethods(Transport):
             AnswerReceipt,
             self.request_json(
                 "POST",
-                "/api/v1/blind-pairs/{token}/answer",
-                {"token": token},
+                "/api/v1/blind-pairs/{code}/answer",
+                {"code": code},
                 body=body,
                 key=idempotency_key,
             ),
         )
 
-    def get_blind_motion(self, token: str, side: Literal["first", "second"]) -> BlindMotion:
+    def get_blind_motion(self, code: str, side: Literal["first", "second"]) -> BlindMotion:
         """Get a motion of a blind pair.
 
         The phase at which motions start differs between pairs, and is the same for both motions of a pair.
@@ -60,18 +60,18 @@ class BlindMethods(Transport):
             BlindMotion,
             self.request_json(
                 "GET",
-                "/api/v1/blind-pairs/{token}/motions/{side}",
-                {"token": token, "side": side},
+                "/api/v1/blind-pairs/{code}/motions/{side}",
+                {"code": code, "side": side},
             ),
         )
 
-    def draw_blind_pair(self, study_id: StudyId, *, idempotency_key: Optional[str] = None) -> NextPair:
+    def draw_blind_pair(self, study_id: StudyId, *, idempotency_key: Optional[str] = None) -> NextBlindPair:
         """Draw the next pair for a rater.
 
         Returns the same pair until it is answered.
         """
         return cast(
-            NextPair,
+            NextBlindPair,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/blind-pairs/next",
@@ -93,7 +93,7 @@ class BlindMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Unblind],
+        **body: Unpack[RaterUnblinding],
     ) -> UnblindedRater:
         """Unblind a rater.
 

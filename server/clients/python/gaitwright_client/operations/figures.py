@@ -38,7 +38,7 @@ class FiguresMethods(Transport):
             {"id": reference_gait_id, "file": file},
         )
 
-    def get_belief_figure(
+    def get_analysis_figure(
         self,
         study_id: StudyId,
         file: str,
@@ -54,7 +54,7 @@ class FiguresMethods(Transport):
         """
         return self.request_bytes(
             "GET",
-            "/api/v1/studies/{id}/belief/figures/{file}",
+            "/api/v1/studies/{id}/analysis/figures/{file}",
             {"id": study_id, "file": file},
             query={"x": x, "y": y},
         )

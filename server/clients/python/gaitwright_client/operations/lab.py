@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
-    Closing,
     ControllerFile,
+    EmgProcessing,
     EmgView,
+    LabSessionClosing,
     LabSessionId,
     LabSessionProgress,
+    LabSessionUnblinding,
     LabSessionView,
     LimitCycles,
     MeasurementFile,
     MeasurementFileId,
     NewEmg,
+    NewJointAngles,
     NewLabAnswer,
     NewLabSession,
-    NewMotion,
-    Processing,
     RecordedWalk,
     StudyId,
-    UnblindSession,
 )
 from ..transport import Transport
 
@@ -73,7 +73,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Closing],
+        **body: Unpack[LabSessionClosing],
     ) -> LabSessionView:
         """Close a lab session.
 
@@ -132,7 +132,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Processing],
+        **body: Unpack[EmgProcessing],
     ) -> EmgView:
         """Create an EMG result.
 
@@ -200,12 +200,12 @@ class LabMethods(Transport):
             ),
         )
 
-    def create_motion_file(
+    def create_joint_angle_file(
         self,
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[NewMotion],
+        **body: Unpack[NewJointAngles],
     ) -> MeasurementFile:
         """Create a measurement file with joint angles.
 
@@ -217,7 +217,7 @@ class LabMethods(Transport):
             MeasurementFile,
             self.request_json(
                 "POST",
-                "/api/v1/lab-sessions/{id}/measurement-files/motion",
+                "/api/v1/lab-sessions/{id}/measurement-files/joint-angles",
                 {"id": lab_session_id},
                 body=body,
                 key=idempotency_key,
@@ -263,7 +263,7 @@ class LabMethods(Transport):
         lab_session_id: LabSessionId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[UnblindSession],
+        **body: Unpack[LabSessionUnblinding],
     ) -> LabSessionView:
         """Unblind a lab session.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
+    AnswerRetraction,
     Assessment,
     AssessmentId,
     CreatedPreference,
@@ -18,7 +19,6 @@ from ..schemas import (
     NewSafetyReport,
     NewSafetyReview,
     Preference,
-    Retract,
     SafetyReport,
     SafetyReview,
     StudyId,
@@ -43,7 +43,7 @@ class PreferencesMethods(Transport):
         assessment_id: AssessmentId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Retract],
+        **body: Unpack[AnswerRetraction],
     ) -> Assessment:
         """Retract an assessment.
 
@@ -71,7 +71,7 @@ class PreferencesMethods(Transport):
         preference_id: FeedbackId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Retract],
+        **body: Unpack[AnswerRetraction],
     ) -> Preference:
         """Retract a preference.
 

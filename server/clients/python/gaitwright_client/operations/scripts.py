@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Optional, cast
 
 from ..schemas import (
-    Ask,
+    AskRequest,
     StudyId,
-    Tell,
+    TellRequest,
     Trial,
     TrialId,
 )
@@ -23,7 +23,13 @@ if TYPE_CHECKING:
 class ScriptsMethods(Transport):
     """Operations with the tag `scripts`."""
 
-    def ask_for_trial(self, study_id: StudyId, *, idempotency_key: Optional[str] = None, **body: Unpack[Ask]) -> Trial:
+    def ask_for_trial(
+        self,
+        study_id: StudyId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[AskRequest],
+    ) -> Trial:
         """Ask for a trial to evaluate.
 
         Returns the same trial until its outcome is reported.
@@ -41,7 +47,13 @@ class ScriptsMethods(Transport):
             ),
         )
 
-    def tell_outcome(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None, **body: Unpack[Tell]) -> Trial:
+    def tell_outcome(
+        self,
+        trial_id: TrialId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[TellRequest],
+    ) -> Trial:
         """Tell the outcome of a trial.
 
         An outcome without a gait is also a result. If the script fails, cancel the trial instead.

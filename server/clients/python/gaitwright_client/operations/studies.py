@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Optional, cast
 from ..events import Event, follow
 from ..paging import Pages
 from ..schemas import (
-    Change,
-    Extend,
     Import,
     Milestone,
     NewStudy,
     Recommendation,
+    StateChangeReason,
+    StudyChange,
     StudyClone,
     StudyComparison,
+    StudyExtension,
     StudyId,
     StudyState,
     StudyView,
     SubjectId,
-    TransitionReason,
 )
 from ..transport import Transport
 
@@ -69,9 +69,9 @@ class StudiesMethods(Transport):
 
         Starts the study, unless `start` is false.
 
-        Fields: subject_id; optionally base_bounds, device_id, evaluation, feedback_mode, gait_settings, learner,
-        muscles, name, parallel_trials, priority, reference_gait_id, repeat_results, restricted, search_space, seed,
-        solve_options, solve_seconds_budget, start, trial_budget, unchanged_limit, warm_start_from.
+        Fields: subject_id; optionally answer_source, base_bounds, device_id, evaluation, gait_settings, learner,
+        muscles, name, number_of_trials, parallel_trials, priority, reference_gait_id, repeat_results, restricted,
+        search_space, seed, solve_options, solve_seconds_budget, start, unchanged_limit, warm_start_from.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 
@@ -88,7 +88,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Change],
+        **body: Unpack[StudyChange],
     ) -> StudyView:
         """Update a study.
 
@@ -127,7 +127,7 @@ class StudiesMethods(Transport):
 
         Creates a study with the same set-up, without the trials.
 
-        Fields: optionally feedback_mode, muscles, name, seed, start, trial_budget.
+        Fields: optionally answer_source, muscles, name, number_of_trials, seed, start.
         """
         return cast(
             StudyView,
@@ -157,13 +157,13 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Extend],
+        **body: Unpack[StudyExtension],
     ) -> StudyView:
         """Extend a study.
 
         If the study has ended, it resumes.
 
-        Fields: trial_budget.
+        Fields: number_of_trials.
         """
         return cast(
             StudyView,
@@ -205,7 +205,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Pause a study.
 
@@ -228,7 +228,7 @@ class StudiesMethods(Transport):
     def get_recommendation(self, study_id: StudyId) -> Recommendation:
         """Get the recommendation of a study.
 
-        Of the actions tried, the one that the learner believes to be the best.
+        Of the actions tried, the one with the highest utility.
         """
         return cast(Recommendation, self.request_json("GET", "/api/v1/studies/{id}/recommendation", {"id": study_id}))
 
@@ -245,7 +245,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Resume a study.
 
@@ -271,7 +271,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Start a study.
 
@@ -297,7 +297,7 @@ class StudiesMethods(Transport):
         *,
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[TransitionReason],
+        **body: Unpack[StateChangeReason],
     ) -> StudyView:
         """Stop a study.
 

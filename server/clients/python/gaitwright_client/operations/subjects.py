@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Optional, cast
 from ..paging import Pages
 from ..schemas import (
     Consent,
+    ConsentWithdrawal,
     Correction,
     MuscleParameters,
     NewConsent,
@@ -18,7 +19,6 @@ from ..schemas import (
     ReferenceGaitMatch,
     Subject,
     SubjectId,
-    Withdrawal,
 )
 from ..transport import Transport
 
@@ -157,7 +157,7 @@ class SubjectsMethods(Transport):
         subject_id: SubjectId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Withdrawal],
+        **body: Unpack[ConsentWithdrawal],
     ) -> Consent:
         """Withdraw consent.
 

@@ -13,9 +13,9 @@ from ..schemas import (
     Certificate,
     ControllerFile,
     GaitDocument,
+    GaitMotion,
     Iteration,
     Job,
-    Motion,
     NewExecutionReport,
     SolveProblem,
     StudyId,
@@ -158,9 +158,9 @@ class TrialsMethods(Transport):
         """Request the execution report of a trial.
 
         The gait of the trial must have converged. Walks on level ground, and on ground uneven by ±5 mm and by ±10 mm,
-        are simulated. The same number of walks and seed give the same report.
+        are simulated. The same number of simulated walks and seed give the same report.
 
-        Fields: optionally seed, walks.
+        Fields: optionally seed, simulated_walks.
         """
         return cast(
             Job,
@@ -220,12 +220,12 @@ class TrialsMethods(Transport):
         """
         return Pages(self, "/api/v1/trials/{id}/iterations", {"id": trial_id}, query={"limit": page_size})
 
-    def get_gait_motion(self, trial_id: TrialId) -> Motion:
+    def get_gait_motion(self, trial_id: TrialId) -> GaitMotion:
         """Get the motion of a gait.
 
         Stick figures over one stride, for an animation.
         """
-        return cast(Motion, self.request_json("GET", "/api/v1/trials/{id}/motion", {"id": trial_id}))
+        return cast(GaitMotion, self.request_json("GET", "/api/v1/trials/{id}/motion", {"id": trial_id}))
 
     def get_solve_problem(self, trial_id: TrialId) -> SolveProblem:
         """Download the problem file of a trial.
@@ -237,7 +237,7 @@ class TrialsMethods(Transport):
     def retry_trial(self, trial_id: TrialId, *, idempotency_key: Optional[str] = None) -> Job:
         """Retry a trial.
 
-        Queues a trial again that ended without a result. The job of its solve can be followed and cancelled.
+        Requeues a trial that ended without a result. The job of its solve can be followed and cancelled.
         """
         return cast(Job, self.request_json("POST", "/api/v1/trials/{id}/retry", {"id": trial_id}, key=idempotency_key))
 

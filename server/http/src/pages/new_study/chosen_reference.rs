@@ -52,8 +52,8 @@ fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> Strin
     };
     match matches.first() {
         _ if known == 0 => {
-            let why = "No reference gait has both height and body mass, so the nearest one is unknown.";
-            format!("{why} Chosen: {}.", chosen.reference_gait.name)
+            let why = "The nearest reference gait is unknown, because none states both height and body mass.";
+            format!("{why} The chosen reference gait is {}.", chosen.reference_gait.name)
         }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
             let name = &first.reference_gait.name;

@@ -36,10 +36,10 @@ pub(crate) struct NewStudyFields {
     #[serde(default)]
     pub(super) reference_gait: String,
     pub(super) muscles: String,
-    pub(super) feedback_mode: String,
+    pub(super) answer_source: String,
     #[serde(default = "linecospar")]
     pub(super) learner: String,
-    pub(super) trial_budget: String,
+    pub(super) number_of_trials: String,
     #[serde(default)]
     pub(super) unchanged_limit: String,
     pub(super) parallel_trials: String,
@@ -79,9 +79,9 @@ impl Default for NewStudyFields {
             device: String::new(),
             reference_gait: String::new(),
             muscles: text("on"),
-            feedback_mode: text("automatic"),
+            answer_source: text("gait_rmse"),
             learner: linecospar(),
-            trial_budget: text("15"),
+            number_of_trials: text("15"),
             unchanged_limit: String::new(),
             parallel_trials: text("1"),
             seed: text("1"),
@@ -111,9 +111,9 @@ impl NewStudyFields {
             device: plan.device_id.to_string(),
             reference_gait: plan.reference_gait_id.to_string(),
             muscles: if plan.muscles { "on" } else { "off" }.to_owned(),
-            feedback_mode: plan.feedback_mode.as_str().to_owned(),
+            answer_source: plan.answer_source.as_str().to_owned(),
             learner: known.map_or(KEPT, |(name, ..)| name).to_owned(),
-            trial_budget: plan.trial_budget.to_string(),
+            number_of_trials: plan.number_of_trials.to_string(),
             unchanged_limit: plan.unchanged_limit.map_or_else(String::new, |limit| limit.to_string()),
             parallel_trials: plan.parallel_trials.to_string(),
             seed: plan.seed.to_string(),
@@ -169,9 +169,9 @@ impl NewStudyFields {
             "height_m" => self.height_m = text("1.75"),
             "body_mass_kg" => self.body_mass_kg = text("70"),
             "muscles" => self.muscles = default.muscles,
-            "feedback_mode" => self.feedback_mode = default.feedback_mode,
+            "answer_source" => self.answer_source = default.answer_source,
             "learner" => self.learner = default.learner,
-            "trial_budget" => self.trial_budget = default.trial_budget,
+            "number_of_trials" => self.number_of_trials = default.number_of_trials,
             "unchanged_limit" => self.unchanged_limit.clear(),
             "parallel_trials" => self.parallel_trials = default.parallel_trials,
             "seed" => self.seed = default.seed,
@@ -252,7 +252,7 @@ pub(super) fn place_in_form(field: &str) -> usize {
     const BEFORE_BOUNDS: [&str; 7] =
         ["subject", "pseudonym", "height_m", "body_mass_kg", "device", "reference_gait", "muscles"];
     const AFTER_BOUNDS: [&str; 7] =
-        ["feedback_mode", "trial_budget", "name", "learner", "unchanged_limit", "parallel_trials", "seed"];
+        ["answer_source", "number_of_trials", "name", "learner", "unchanged_limit", "parallel_trials", "seed"];
     let before = BEFORE_BOUNDS.iter().position(|known| *known == field);
     let after = || AFTER_BOUNDS.iter().position(|known| *known == field).map(|place| place + BEFORE_BOUNDS.len() + 1);
     before.or_else(after).unwrap_or(if field.len() < 4 || field.contains("_a") { 7 } else { usize::MAX })
@@ -269,8 +269,8 @@ fn label(field: &str) -> String {
         "device" | "device_id" => "Device",
         "reference_gait" | "reference_gait_id" => "Reference gait",
         "muscles" => "Variant",
-        "feedback_mode" => "Comparisons are answered by",
-        "trial_budget" => "Trials",
+        "answer_source" => "Source of answers",
+        "number_of_trials" => "Number of trials",
         "learner" => "Learner",
         "unchanged_limit" => "Stop early after",
         "parallel_trials" => "Parallel trials",

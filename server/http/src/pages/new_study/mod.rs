@@ -276,10 +276,10 @@ pub(super) async fn check(
 /// The size of the study and its expected duration.
 async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error> {
     let combinations = format::count(plan.search_space.len());
-    let size = format!("The study tries {} of {combinations} combinations of bounds", plan.trial_budget);
-    let people = format::also_waits_for(plan.feedback_mode);
+    let size = format!("The study tries {} of {combinations} combinations of bounds", plan.number_of_trials);
+    let people = format::also_waits_for(plan.answer_source);
     // Parallel trials share the machine, so they are not counted as faster.
-    let took = |measured: trials::SolveTimes| measured.median_seconds * f64::from(plan.trial_budget);
+    let took = |measured: trials::SolveTimes| measured.median_seconds * f64::from(plan.number_of_trials);
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
         Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(

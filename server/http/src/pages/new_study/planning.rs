@@ -8,7 +8,7 @@ use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
-use gaitwright_store::studies::{self, FeedbackMode, Study, StudyPlan, WarmStartFrom};
+use gaitwright_store::studies::{self, AnswerSource, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::str::FromStr;
 
@@ -146,15 +146,15 @@ fn study_of(
         },
         search_space: Some(search_space.into()),
         base_bounds,
-        feedback_mode: FeedbackMode::from_str(&fields.feedback_mode)
-            .map_err(|_| Error::invalid("feedback_mode", fields.feedback_mode.as_str(), "automatic, human or mixed"))?,
+        answer_source: AnswerSource::from_str(&fields.answer_source)
+            .map_err(|_| Error::invalid("answer_source", fields.answer_source.as_str(), "gait_rmse, people or both"))?,
         solve_options: SolveOptions { local_optimum_choice: local_optimum_choice(fields)?, ..base.solve_options },
         learner: match learner(&fields.learner) {
             Some(chosen) => chosen,
             None if like.is_some() && fields.learner == KEPT => base.learner,
             None => return Err(Error::invalid("learner", fields.learner.as_str(), &learners)),
         },
-        trial_budget: number("trial_budget", &fields.trial_budget, "1 to 10000")?,
+        number_of_trials: number("number_of_trials", &fields.number_of_trials, "1 to 10000")?,
         unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", study_plan::LARGEST_SEED))?,

@@ -4,7 +4,7 @@ use crate::form_errors;
 use gait_learner::{Dimension, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::{Error, FieldError};
-use gaitwright_service::studies::search_space::TABLE_I;
+use gaitwright_service::studies::bound_grid::TABLE_I;
 use std::collections::BTreeMap;
 
 /// The entries of one bound.
@@ -117,7 +117,7 @@ fn number(field: &str, text: &str, allowed: &str) -> Result<f64, Error> {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
-    use gaitwright_service::studies::search_space::table_i;
+    use gaitwright_service::studies::bound_grid::table_i;
 
     fn typed(fields: &[(&str, &str)]) -> BTreeMap<String, String> {
         fields.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect()

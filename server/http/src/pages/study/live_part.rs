@@ -1,9 +1,9 @@
 //! The part of the study page that changes while the study runs.
 
-use super::answers::{AnswerRow, answers};
+use super::answers_table::{AnswerRow, answers};
 use super::recommended_walker::RecommendedGait;
+use super::state_buttons::{TransitionButton, button};
 use super::time_left::time_left;
-use super::transitions::{TransitionButton, button};
 use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use super::without_gait::TrialsWithoutGait;
 use crate::AppState;
@@ -16,9 +16,9 @@ use gait_learner::LearnerError;
 use gaitwright_charts::Figure;
 use gaitwright_charts::gait_charts;
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Caller, Permission, Run};
+use gaitwright_service::access::{Caller, RequiredRight, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::belief::{Beliefs, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analyses, MOST_ANSWERS};
 use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
@@ -27,7 +27,7 @@ use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::workers::Track;
-use gaitwright_store::studies::{FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
 use gaitwright_store::{Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, jobs, studies, trials};
 use std::sync::Arc;
@@ -73,9 +73,9 @@ pub(super) struct Live {
     tree: Option<PageChart>,
     answers: Vec<AnswerRow>,
     unsafe_gaits: Vec<UnsafeGait>,
-    question: bool,
+    comparison_pending: bool,
     /// The trial whose certificate the next comparison waits for.
-    question_after: Option<(TrialId, u32)>,
+    comparison_after: Option<(TrialId, u32)>,
     can_compare: bool,
 }
 
@@ -89,7 +89,7 @@ impl Live {
 
     /// Whether the study has ended and nothing waits for a person, so that the recommended gait comes before the state.
     fn leads_with_outcome(&self) -> bool {
-        self.unsafe_gaits.is_empty() && !self.question && self.study.state.has_ended()
+        self.unsafe_gaits.is_empty() && !self.comparison_pending && self.study.state.has_ended()
     }
 
     /// Whether answers are missing from the list.
@@ -121,7 +121,7 @@ struct BestGait {
     cost: String,
     bounds: Vec<Bound>,
     has_gait: bool,
-    /// Whether a script evaluated it and reported figures only.
+    /// Whether a script evaluated it and reported values only.
     by_script: bool,
     /// The state of its certificate.
     certification: BestCertification,
@@ -189,9 +189,9 @@ pub(super) async fn read_live(
     let table = TrialsTable::read(&mut reader, id, counts, choice).await?;
     let assessments = assessments::of_study(&mut reader, id).await?;
     drop(reader);
-    let beliefs = Arc::clone(&app.beliefs);
+    let analyses = Arc::clone(&app.analyses);
     let draw = move |pool: &OnPool| {
-        let outcome = learned(pool, &snapshot, large, &beliefs);
+        let outcome = learned(pool, &snapshot, large, &analyses);
         (snapshot, outcome)
     };
     let (snapshot, learned) = app.compute(draw).await?;
@@ -204,7 +204,7 @@ pub(super) async fn read_live(
         None => false,
     };
     let simulated_walks = match outcome.best {
-        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.simulated.report.sentence()),
+        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.reported.report.sentence()),
         None => None,
     };
     drop(reader);
@@ -242,13 +242,13 @@ struct Learned {
     utility: Option<Figure>,
 }
 
-fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, beliefs: &Beliefs) -> Result<Learned, LearnerError> {
-    let outcome = StudyOutcome::of(pool, snapshot, large, beliefs)?;
+fn learned(pool: &OnPool, snapshot: &StudySnapshot, large: bool, analyses: &Analyses) -> Result<Learned, LearnerError> {
+    let outcome = StudyOutcome::of(pool, snapshot, large, analyses)?;
     if large || outcome.best.is_none() {
         return Ok(Learned { outcome, certainty: None, utility: None });
     }
-    let certainty = certainty(snapshot, &*beliefs.of(pool, snapshot)?);
-    Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, beliefs)? })
+    let certainty = certainty(snapshot, &*analyses.of(pool, snapshot)?);
+    Ok(Learned { outcome, certainty, utility: utility(pool, snapshot, analyses)? })
 }
 
 pub(super) fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
@@ -298,15 +298,15 @@ fn view(
     let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| BestGait {
         id: trial.id,
         number: trial.number,
-        rmse: format::figure(trial.gait_rmse_rad),
-        cost: format::figure(trial.cost_of_transport),
+        rmse: format::decimal(trial.gait_rmse_rad),
+        cost: format::decimal(trial.cost_of_transport),
         bounds: format::bounds(&trial.action),
         has_gait,
         by_script: trial.script.is_some(),
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
             id: trial.id,
             number: trial.number,
-            rmse: format::figure(trial.gait_rmse_rad),
+            rmse: format::decimal(trial.gait_rmse_rad),
         }),
         certification: certification.clone(),
         simulated_walks,
@@ -337,23 +337,23 @@ fn view(
         queued: String::new(),
         without_gait,
         never_active: String::new(),
-        progress: [counts.results(), snapshot.study.plan.trial_budget].map(format::count),
+        progress: [counts.results(), snapshot.study.plan.number_of_trials].map(format::count),
         counts,
         running,
         best,
         certainty,
         walker: RecommendedGait::None,
         unanswered: outcome.unanswered,
-        people_answer: snapshot.study.plan.feedback_mode == FeedbackMode::Human,
+        people_answer: snapshot.study.plan.answer_source == AnswerSource::People,
         utility: utility.map(|figure| PageChart::of(&figure, &files, "")),
         chart: course(&[(&snapshot, &outcome)]).map(|chart| PageChart::of(&Figure::chart(COURSE, chart), &files, "")),
         table,
         tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| PageChart::of(&figure, &files, "")),
         answers,
         unsafe_gaits,
-        question: outcome.question,
-        question_after: outcome
-            .question_after
+        comparison_pending: outcome.comparison_pending,
+        comparison_after: outcome
+            .comparison_after
             .filter(|_| !snapshot.study.state.has_ended())
             .and_then(|id| snapshot.trial(id))
             .map(|trial| (trial.id, trial.number)),

@@ -1,16 +1,16 @@
 //! The study page, kept current by events.
 
-mod answers;
+mod answers_table;
 mod live_part;
 mod recommended_walker;
+mod state_buttons;
 mod time_left;
-mod transitions;
 mod trials_table;
 mod without_gait;
 
-pub(super) use self::answers::{answer_in_words, assessment_in_words};
+pub(super) use self::answers_table::{answer_in_words, assessment_in_words};
 use self::live_part::{RunningRow, read_live, running_row};
-pub(super) use self::transitions::post;
+pub(super) use self::state_buttons::post;
 use self::trials_table::TrialsQuery;
 use crate::AppState;
 use crate::accessible::Id;
@@ -24,7 +24,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Administer, Permission, Read, Run};
+use gaitwright_service::access::{Administer, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::devices::{self, Device};
@@ -53,7 +53,7 @@ struct StudyPage {
     sessions: Vec<(LabSessionId, u32)>,
     last_event: i64,
     variant: &'static str,
-    answers_by: &'static str,
+    answer_source: &'static str,
     may_administer: bool,
     /// Imports; empty if the study was created here.
     imports: Vec<Import>,
@@ -101,7 +101,8 @@ pub(super) async fn get(
     let (walks, trials) = (live.walker.has_place(), live.counts.total);
     let live = live.render().map_err(|e| Error::Internal(e.to_string()))?;
     let may_administer = authorized.caller.may(Administer::NEEDED);
-    let (variant, answers_by) = (format::variant(study.plan.muscles), format::answers_by(study.plan.feedback_mode));
+    let (variant, answer_source) =
+        (format::variant(study.plan.muscles), format::answer_source(study.plan.answer_source));
     page(&StudyPage {
         units,
         study,
@@ -114,7 +115,7 @@ pub(super) async fn get(
         sessions: sessions.iter().map(|session| (session.id, session.number)).collect(),
         last_event,
         variant,
-        answers_by,
+        answer_source,
         may_administer,
         imports,
     })

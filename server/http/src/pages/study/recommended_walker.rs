@@ -2,7 +2,7 @@
 
 use crate::AppState;
 use gait_optimizer::Gait;
-use gaitwright_charts::{Ghost, WalkerFigure};
+use gaitwright_charts::{GaitWalker, Ghost};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_store::studies::{Evaluation, Study};
@@ -73,7 +73,7 @@ impl RecommendedWalker {
         let draw = move |pool: &OnPool| {
             let gait: Gait = gait.unpack(pool)?;
             let ghost = Ghost::of_reference(&gait, &reference);
-            let figure = WalkerFigure::new(&gait).and_then(|figure| Ok(figure.with_ghost(ghost?)));
+            let figure = GaitWalker::new(&gait).and_then(|figure| Ok(figure.with_ghost(ghost?)));
             Ok::<_, Error>(figure.ok().map(|figure| figure.svg("The recommended gait")))
         };
         let svg = app.compute(draw).await.map_err(Error::from)??;

@@ -18,7 +18,10 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
         return "The time left depends on the script that evaluates the trials.".to_owned();
     }
     let solves: Vec<f64> = snapshot.trials.iter().filter_map(|trial| trial.seconds_total).collect();
-    let left = study.plan.trial_budget.saturating_sub(results);
+    let left = study.plan.number_of_trials.saturating_sub(results);
+    if left == 0 {
+        return "All trials have been solved.".to_owned();
+    }
     let Some(median) = median(&solves) else {
         let missing = FEWEST_SOLVES - solves.len();
         if left as usize <= missing {
@@ -35,7 +38,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
     }
     let at_most = if study.plan.unchanged_limit.is_some() { "At most about" } else { "About" };
     let trials = if left == 1 { "1 trial".to_owned() } else { format!("{left} trials") };
-    let people = format::also_waits_for(study.plan.feedback_mode);
+    let people = format::also_waits_for(study.plan.answer_source);
     format!(
         "{at_most} {} left for {trials}{people}; half of the solves so far took less than {}.",
         format::duration(seconds),

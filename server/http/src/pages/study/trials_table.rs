@@ -4,8 +4,8 @@
 use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
+use gaitwright_store::trial_query::{self, ListedTrial, Listing, SORTS};
 use gaitwright_store::trials::{TrialCounts, TrialState};
-use gaitwright_store::trials_table::{self, ListedTrial, Listing, SORTS};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
 
@@ -107,7 +107,7 @@ pub(super) struct TrialsTable {
     pub(super) any: bool,
     pub(super) choice: TrialsQuery,
     pub(super) states: Vec<StateChoice>,
-    pub(super) figures: Vec<Column>,
+    pub(super) values: Vec<Column>,
     pub(super) bounds: Vec<Column>,
     pub(super) rows: Vec<TrialRow>,
     /// Which trials are shown, if the page does not show all of them.
@@ -124,7 +124,7 @@ impl TrialsTable {
         choice: TrialsQuery,
     ) -> Result<Self, Error> {
         let listing = choice.listing()?;
-        let listed = trials_table::of_study(db, study, &listing).await?;
+        let listed = trial_query::of_study(db, study, &listing).await?;
         let matching = listed.first().map_or(0, |row| row.matching);
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
         let page = |page: u32| TrialsQuery { page, ..choice.clone() }.link();
@@ -132,7 +132,7 @@ impl TrialsTable {
         Ok(Self {
             any: counts.total > 0,
             states: states(listing.state),
-            figures: columns(&choice, &listing, false)?,
+            values: columns(&choice, &listing, false)?,
             bounds: columns(&choice, &listing, true)?,
             extent: (matching < counts.total || shown < matching)
                 .then(|| extent(shown, listing.offset, matching, counts.total)),
@@ -201,8 +201,8 @@ fn trial_row(listed: ListedTrial) -> TrialRow {
         number: listed.number,
         state: listed.state.as_str(),
         state_words: words(listed.state.as_str()),
-        rmse: format::figure(listed.gait_rmse_rad),
-        cost: format::figure(listed.cost_of_transport),
+        rmse: format::decimal(listed.gait_rmse_rad),
+        cost: format::decimal(listed.cost_of_transport),
         iterations: listed.iterations.map_or_else(|| "–".to_owned(), |n| n.to_string()),
         seconds: format::seconds(listed.seconds_total),
         from: listed.from,

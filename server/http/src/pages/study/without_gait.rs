@@ -22,7 +22,7 @@ impl TrialsWithoutGait {
         if let Some(Relief { bound, trials, instance }) = &common.relief {
             let limited = TunedBounds::quantity_of(bound);
             let reason = format!(
-                "In {trials} of {explained} explained trials, relaxing {bound} ({limited}) alone gives a gait."
+                "In {trials} of the {explained} trials with an explanation, relaxing {bound} ({limited}) alone gives a gait."
             );
             return Some(Self { reason, instance: *instance });
         }
@@ -37,7 +37,9 @@ impl TrialsWithoutGait {
         let newest = most.last()?;
         let alone = match explained {
             0 => String::new(),
-            _ => format!(" Relaxing a single bound gives no gait in any of the {explained} explained trials."),
+            _ => {
+                format!(" Relaxing a single bound gives no gait in any of the {explained} trials with an explanation.")
+            }
         };
         let reason =
             format!("{constraint} has the largest violation in {} of {all} trials without a gait.{alone}", most.len());

@@ -13,8 +13,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// What exactly was changed. Which fields there are depends on the kind of change; a field without kinds in its
-/// description occurs with several.
+/// What exactly was changed. The fields depend on the kind of change. A field whose description names no kind
+/// occurs with several kinds.
 #[derive(Debug, ToSchema)]
 pub(crate) struct AuditDetail {
     /// `trial.ask`: true if the script was given its open trial again.
@@ -51,10 +51,10 @@ pub(crate) struct AuditDetail {
     /// `gait.review`: the decision.
     #[schema(required = false)]
     decision: SafetyDecision,
-    /// `session.refused`: number of failed attempts of the network.
+    /// `sign_in.failures`: number of failed attempts of the network.
     #[schema(required = false)]
     failed_attempts: u32,
-    /// `session.refuse`, `session.wait`: number of failed attempts of the network so far.
+    /// `sign_in.refused`, `sign_in.delay`: number of failed attempts of the network so far.
     #[schema(required = false)]
     failed_attempts_of_network: u32,
     /// `trial.certify`: reasons of a failed certificate; otherwise empty.
@@ -66,7 +66,7 @@ pub(crate) struct AuditDetail {
     /// `study.import`: SHA-256 of the archive, hexadecimal.
     #[schema(required = false)]
     file_sha256: String,
-    /// `session.refused`: time of the first attempt.
+    /// `sign_in.failures`: time of the first attempt.
     #[schema(required = false)]
     first_at: Instant,
     /// `study.create`: the study whose set-up was copied. Null if it is not a clone.
@@ -85,10 +85,10 @@ pub(crate) struct AuditDetail {
     /// `study.prune`: trials whose gaits were kept.
     #[schema(required = false)]
     kept: Vec<TrialId>,
-    /// Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.record`).
+    /// Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.upload`).
     #[schema(required = false)]
     kind: AuditedKind,
-    /// `session.refused`: time of the last attempt.
+    /// `sign_in.failures`: time of the last attempt.
     #[schema(required = false)]
     last_at: Instant,
     /// Identifier of the member: `study.member_add`, `study.member_end`.
@@ -100,10 +100,10 @@ pub(crate) struct AuditDetail {
     /// Name of the object, of the member, or of the user who tried to sign in.
     #[schema(required = false)]
     name: String,
-    /// `session.refused`: number of different names that were tried.
+    /// `sign_in.failures`: number of different names that were tried.
     #[schema(required = false)]
     names: u32,
-    /// Network of the address: `session.refuse`, `session.refused`, `session.wait`.
+    /// Network of the address: `sign_in.refused`, `sign_in.failures`, `sign_in.delay`.
     #[schema(required = false)]
     network: String,
     /// Note about the answer, walk or session.
@@ -130,18 +130,18 @@ pub(crate) struct AuditDetail {
     /// `subject.add`: the pseudonym.
     #[schema(required = false)]
     pseudonym: String,
-    /// Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind`.
+    /// Name of the rater: `blind_pair.draw`, `blind_pair.retract`, `study.unblind_rater`.
     #[schema(required = false)]
     rater: String,
     /// Reason for the change, or why an answer was not used. Null if none was given.
     reason: Option<String>,
-    /// `lab_session.record`: the measurement file.
+    /// `lab_session.upload`: the measurement file.
     #[schema(required = false)]
     recording: MeasurementFileId,
     /// `lab_session.process`: the measurement files that were processed.
     #[schema(required = false)]
     recordings: Vec<MeasurementFileId>,
-    /// `trial.explain`: name of a bound with a relaxed value of which a gait exists. Null if none was found.
+    /// `trial.explain`: name of the bound that gives a gait if it is relaxed. Null if there is none.
     relaxed_bound: Option<String>,
     /// Whether only members see the study: `study.create`, `study.restrict`.
     #[schema(required = false)]
@@ -158,13 +158,13 @@ pub(crate) struct AuditDetail {
     /// `record.backup`: true.
     #[schema(required = false)]
     scheduled: bool,
-    /// `token.make`: scopes of the token.
+    /// `token.create`: scopes of the token.
     #[schema(required = false)]
     scopes: Vec<Right>,
     /// `trial.ask`: name of the script.
     #[schema(required = false)]
     script: String,
-    /// Seed of the study (`study.create`) or of simulated walks (`trial.ask_execution_report`, `trial.simulate`).
+    /// Seed of the study (`study.create`) or of simulated walks (`trial.request_execution_report`, `trial.report_execution`).
     #[schema(required = false)]
     seed: u64,
     /// `session.end`: the sign-in session.
@@ -173,7 +173,7 @@ pub(crate) struct AuditDetail {
     /// `lab_session.process`: filters.
     #[schema(required = false)]
     settings: EmgSettings,
-    /// `lab_session.record`: SHA-256 of the file, hexadecimal.
+    /// `lab_session.upload`: SHA-256 of the file, hexadecimal.
     #[schema(required = false)]
     sha256: String,
     /// `study.import`: public key of the signature, hexadecimal. Null without a signature.
@@ -207,19 +207,19 @@ pub(crate) struct AuditDetail {
     trial_b: TrialId,
     /// `trial.relax`: number of trials of the study.
     #[schema(required = false)]
-    trial_budget: u32,
+    number_of_trials: u32,
     /// `study.import`: whether the key of the signature is trusted.
     #[schema(required = false)]
     trusted: bool,
     /// `study.import`: number of gaits whose Gait RMSE could not be computed again.
     #[schema(required = false)]
     unchecked_rmse: u32,
-    /// Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.record`, `lab_session.walk`.
+    /// Number of the walk, 1 to 3: `lab_session.controller_file`, `lab_session.upload`, `lab_session.record_walk`.
     #[schema(required = false)]
     walk: u8,
-    /// Number of simulated walks on each kind of ground: `trial.ask_execution_report`, `trial.simulate`.
+    /// Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
     #[schema(required = false)]
-    walks: u32,
+    simulated_walks: u32,
     /// `trial.relax`: the trial without a gait whose bounds were relaxed.
     #[schema(required = false)]
     without_gait: TrialId,

@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Schemas are never constructed.
 
 use super::settings::DeviceDefinition;
-use gaitwright_service::studies::study_plan_schemas::{Bounds, GaitSettings};
+use gaitwright_service::studies::study_plan_schemas::{BoundsSchema, GaitSettingsSchema};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -19,9 +19,9 @@ pub(crate) struct GaitDocument {
     /// Whether the gait has muscles.
     muscles: bool,
     /// The bounds a1 to a8.
-    bounds: Bounds,
+    bounds: BoundsSchema,
     /// The other settings of the gait problem.
-    settings: GaitSettings,
+    settings: GaitSettingsSchema,
     /// Mean walking speed, m/s.
     speed_m_s: f64,
     /// Stride length, m.

@@ -5,7 +5,7 @@
 use super::gait::WalkerSubject;
 use super::reference_gait::ReferenceGaitDocument;
 use super::settings::DeviceDefinition;
-use gaitwright_service::studies::study_plan_schemas::{Bounds, GaitSettings, SolveOptions};
+use gaitwright_service::studies::study_plan_schemas::{BoundsSchema, GaitSettingsSchema, SolveOptionsSchema};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -15,7 +15,7 @@ pub(crate) struct SolveProblem {
     /// The gait problem.
     problem: GaitProblem,
     /// Options of the solver.
-    options: SolveOptions,
+    options: SolveOptionsSchema,
     /// The warm start. Null for a cold start.
     warm_start: Option<WarmStart>,
 }
@@ -28,11 +28,11 @@ struct GaitProblem {
     /// The device.
     device: DeviceDefinition,
     /// The bounds a1 to a8.
-    bounds: Bounds,
+    bounds: BoundsSchema,
     /// Whether the problem has muscles.
     muscles: bool,
     /// The other settings of the problem.
-    settings: GaitSettings,
+    settings: GaitSettingsSchema,
     /// The reference gait, for Gait RMSE and for initial guesses.
     reference: ReferenceGaitDocument,
 }

@@ -1,13 +1,13 @@
 //! Imports an archive into the record.
 
 use super::super::built_in_entries;
+use super::archive_file::{ArchiveFacts, Next, Unpacker, refuse};
 use super::check;
-use super::file::{ArchiveFacts, Next, Unpacker, refuse};
 use super::signature::PublicKey;
 use crate::error::Error;
 use gaitwright_compute::Pool;
-use gaitwright_store::archive::{self, RowMatch, Unpacking};
 use gaitwright_store::archived_row::{Cell, Row};
+use gaitwright_store::archived_rows::{self, RowMatch, Unpacking};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::imports::{self, NewImport};
 use gaitwright_store::quarantine::Quarantine;
@@ -120,15 +120,15 @@ pub async fn import(store: &Store, actor: &Actor, archive: Archive) -> Result<St
 /// Copies every row into a transaction.
 async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, trusted: bool) -> Result<(), Error> {
     let cloned_from = quarantine.cloned_from().map(str::to_owned);
-    let (sender, mut rows) = mpsc::channel::<archive::Read>(ROWS_AHEAD);
+    let (sender, mut rows) = mpsc::channel::<archived_rows::Read>(ROWS_AHEAD);
     let reading = async {
-        let done = archive::read(quarantine.db(), study, &sender).await;
+        let done = archived_rows::read(quarantine.db(), study, &sender).await;
         drop(sender);
         done
     };
     let writing = async move {
         let mut unpacking = Unpacking::default();
-        while let Some(archive::Read { table, mut row, .. }) = rows.recv().await {
+        while let Some(archived_rows::Read { table, mut row, .. }) = rows.recv().await {
             if table == "studies" {
                 row.set("cloned_from", cloned_from.clone().map_or(Cell::Null, Cell::Text));
             }
@@ -165,7 +165,7 @@ async fn is_new(writer: &mut Writer, table: &str, row: &Row, unpacking: &mut Unp
         "devices" => "device",
         _ => "reference gait",
     };
-    match archive::known(writer, table, row).await? {
+    match archived_rows::known(writer, table, row).await? {
         RowMatch::New => Ok(true),
         RowMatch::Same(here) => {
             unpacking.same.insert(id, here);

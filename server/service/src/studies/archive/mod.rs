@@ -3,12 +3,12 @@
 //! An archive is untrusted input. [`open`] unpacks it into a temporary record and checks every hash, reference and
 //! value there; [`import`] writes only an archive that passed.
 
+pub mod archive_file;
 mod check;
-mod export;
-pub mod file;
 mod import;
 mod signature;
+mod study_export;
 
-pub use export::export;
 pub use import::{Archive, import, open};
 pub use signature::{PublicKey, SigningKey};
+pub use study_export::export;

@@ -1,8 +1,8 @@
 //! Which gait each action has: that of its own solve, or one that another action shares with it.
 
 use super::solved_action::SolvedAction;
+use crate::studies::bound_grid;
 use crate::studies::equal_actions::levels_with_gait;
-use crate::studies::search_space;
 use gait_learner::{ActionIndex, SearchSpace};
 use gait_optimizer::{ModelError, TunedBounds};
 
@@ -60,7 +60,7 @@ impl GaitMap {
     }
 
     pub(super) fn bounds_of(&self, base: TunedBounds, action: ActionIndex) -> Result<TunedBounds, ModelError> {
-        search_space::bounds_of(&self.space, base, action)
+        bound_grid::bounds_of(&self.space, base, action)
     }
 
     /// The next actions without a known gait, at most `most`. Neighbours often share a gait, so the order jumps over the
@@ -147,7 +147,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::solved_action::GaitFigures;
+    use super::super::solved_action::GaitValues;
     use super::*;
     use gait_optimizer::{SolveStatus, UnchangedBound};
 
@@ -157,7 +157,7 @@ mod tests {
             let end = (!free.contains(&dimension.name.as_str())).then_some(value);
             UnchangedBound { bound: dimension.name.clone(), least: end, most: end }
         });
-        let gait = GaitFigures {
+        let gait = GaitValues {
             objective: 0.0,
             cost_of_transport: 0.0,
             gait_rmse_rad: 0.0,
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn actions_in_the_box_of_a_gait_are_not_solved() {
-        let space = search_space::table_i().unwrap();
+        let space = bound_grid::table_i().unwrap();
         let mut atlas = GaitMap::new(space.clone(), solved(&space, 0, &["a1", "a3", "a8"], true));
         assert_eq!(atlas.assigned(), 2 * 3 * 3);
         let mut solves = 1;
@@ -196,7 +196,7 @@ mod tests {
 
     #[test]
     fn gait_of_another_action_replaces_a_solve_without_a_gait() {
-        let space = search_space::table_i().unwrap();
+        let space = bound_grid::table_i().unwrap();
         let mut atlas = GaitMap::new(space.clone(), solved(&space, 5, &[], true));
         atlas.add(solved(&space, 0, &[], false));
         assert_eq!(atlas.solve_of[0], Some(1));

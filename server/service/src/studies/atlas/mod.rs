@@ -6,9 +6,9 @@ mod progress_file;
 mod solved_action;
 
 pub use gait_map::{AtlasRow, GaitMap};
-pub use solved_action::{GaitFigures, SolvedAction};
+pub use solved_action::{GaitValues, SolvedAction};
 
-use super::search_space;
+use super::bound_grid;
 use super::solve_input::SolveInput;
 use crate::error::Error;
 use gait_learner::ActionIndex;
@@ -48,8 +48,8 @@ pub fn make(
     let input =
         SolveInput { problem: family.problem.clone(), options: family.options, warm_start: Some(family.root.clone()) };
     let mut progress = ProgressFile::open(progress, &input)?;
-    let space = search_space::table_i().map_err(Error::Learner)?;
-    let action = search_space::nearest_action(&space, family.problem.bounds).map_err(Error::Learner)?;
+    let space = bound_grid::table_i().map_err(Error::Learner)?;
+    let action = bound_grid::nearest_action(&space, family.problem.bounds).map_err(Error::Learner)?;
     let mut map = GaitMap::new(space, SolvedAction { action, ..root.solved });
     let is_complete = solve_all(&family, &mut map, &mut progress, workers, observer, cancel)?;
     Ok(is_complete.then_some(Finished { map, progress }))

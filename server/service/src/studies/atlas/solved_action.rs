@@ -16,13 +16,13 @@ pub struct SolvedAction {
     pub status: SolveStatus,
     /// Number of its iterations.
     pub iterations: usize,
-    /// The figures of its gait; `None` without one.
-    pub gait: Option<GaitFigures>,
+    /// The values of its gait; `None` without one.
+    pub gait: Option<GaitValues>,
 }
 
-/// The figures of a gait.
+/// The values of a gait.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GaitFigures {
+pub struct GaitValues {
     /// Objective.
     pub objective: f64,
     /// Mechanical cost of transport, dimensionless.
@@ -49,14 +49,14 @@ impl SolvedAction {
     pub(crate) fn of(action: ActionIndex, outcome: &SolveOutcome, reference: &ReferenceGait) -> Result<Self, Error> {
         let report = &outcome.report;
         let gait = match report.status {
-            SolveStatus::Converged => Some(GaitFigures::of(outcome, reference)?),
+            SolveStatus::Converged => Some(GaitValues::of(outcome, reference)?),
             _ => None,
         };
         Ok(Self { action, status: report.status, iterations: report.iterations, gait })
     }
 }
 
-impl GaitFigures {
+impl GaitValues {
     fn of(outcome: &SolveOutcome, reference: &ReferenceGait) -> Result<Self, ModelError> {
         let (report, gait) = (&outcome.report, &outcome.gait);
         let compared = compare_with_references(gait, reference)?;

@@ -1,6 +1,6 @@
 //! Blind comparisons: the server draws pairs and sides for raters, and conceals them until unblinding.
 //!
-//! A rater sees a token and two motions. A fair coin decides the sides of each pair. The learner uses every answer,
+//! A rater sees a code and two motions. A fair coin decides the sides of each pair. The learner uses every answer,
 //! also of repeated pairs, so no response of the service can reveal a repeated pair. Answers of raters who could have
 //! known the allocation are marked.
 

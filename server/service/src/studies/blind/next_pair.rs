@@ -20,20 +20,20 @@ pub struct NextPair {
     pub same_sides_as: Option<BlindPairId>,
 }
 
-/// Chooses what a rater is shown next. `question` is the pending comparison, the newer trial first; `before` lists the
+/// Chooses what a rater is shown next. `pending` is the pending comparison, the newer trial first; `before` lists the
 /// earlier blind pairs of this rater; `reported` lists trials with a safety report in force.
-pub fn next_pair(random: u64, question: (TrialId, TrialId), before: &[BlindPair], reported: &[TrialId]) -> NextPair {
+pub fn next_pair(random: u64, pending: (TrialId, TrialId), before: &[BlindPair], reported: &[TrialId]) -> NextPair {
     let retracted = before.last().filter(|last| last.answer == Some(OrderedAnswer::Retracted));
     if let Some(last) = retracted.filter(|last| !last.has_one_of(reported)) {
         // A rater who confused the sides must find them unchanged.
         let repeated =
             NextPair { kind: last.kind, pair: last.trials(), repeats: last.repeats, same_sides_as: Some(last.id) };
-        let is_question = is_same_pair(last.trials(), question);
-        if last.kind == BlindPairKind::Repeat || is_question {
+        let is_pending = is_same_pair(last.trials(), pending);
+        if last.kind == BlindPairKind::Repeat || is_pending {
             return repeated;
         }
     }
-    let new = NextPair { kind: BlindPairKind::New, pair: question, repeats: None, same_sides_as: None };
+    let new = NextPair { kind: BlindPairKind::New, pair: pending, repeats: None, same_sides_as: None };
     if !random.is_multiple_of(REPEAT_ONE_IN) {
         return new;
     }
@@ -77,7 +77,7 @@ mod tests {
     fn shown(number: u32, next: NextPair) -> BlindPair {
         BlindPair {
             id: BlindPairId::fresh(),
-            token: String::new(),
+            code: String::new(),
             study_id: StudyId::fresh(),
             rater: "R".to_owned(),
             number,
@@ -93,7 +93,7 @@ mod tests {
         }
     }
 
-    fn question() -> (TrialId, TrialId) {
+    fn pending_pair() -> (TrialId, TrialId) {
         (TrialId::fresh(), TrialId::fresh())
     }
 
@@ -101,7 +101,7 @@ mod tests {
     fn one_pair_in_ten_repeats_an_earlier_one() {
         let mut before: Vec<BlindPair> = Vec::new();
         for number in 1..=400 {
-            let next = next_pair(u64::from(number) * 7, question(), &before, &[]);
+            let next = next_pair(u64::from(number) * 7, pending_pair(), &before, &[]);
             if let Some(repeats) = next.repeats {
                 let earlier = before.iter().find(|shown| shown.id == repeats).unwrap();
                 assert_eq!((next.kind, next.pair), (BlindPairKind::Repeat, earlier.trials()));
@@ -116,8 +116,8 @@ mod tests {
     #[test]
     fn pair_with_retracted_answer_is_shown_again_with_the_same_sides() {
         for random in [1, 10] {
-            let pending = question();
-            let earlier = shown(1, next_pair(1, question(), &[], &[]));
+            let pending = pending_pair();
+            let earlier = shown(1, next_pair(1, pending_pair(), &[], &[]));
             let next = next_pair(random, pending, std::slice::from_ref(&earlier), &[]);
             let retracted = BlindPair { answer: Some(OrderedAnswer::Retracted), ..shown(2, next) };
             let id = retracted.id;
@@ -129,17 +129,17 @@ mod tests {
     #[test]
     fn settled_comparison_is_not_shown_again() {
         let retracted =
-            BlindPair { answer: Some(OrderedAnswer::Retracted), ..shown(1, next_pair(1, question(), &[], &[])) };
-        let pending = question();
+            BlindPair { answer: Some(OrderedAnswer::Retracted), ..shown(1, next_pair(1, pending_pair(), &[], &[])) };
+        let pending = pending_pair();
         assert_eq!(next_pair(1, pending, &[retracted], &[]).pair, pending);
     }
 
     #[test]
     fn unsafe_gaits_are_not_repeated() {
-        let next = next_pair(1, question(), &[], &[]);
+        let next = next_pair(1, pending_pair(), &[], &[]);
         let before: Vec<BlindPair> = (1..=50).map(|number| shown(number, next)).collect();
         for random in 0..50 {
-            assert_eq!(next_pair(10 * random, question(), &before, &[next.pair.1]).kind, BlindPairKind::New);
+            assert_eq!(next_pair(10 * random, pending_pair(), &before, &[next.pair.1]).kind, BlindPairKind::New);
         }
     }
 }

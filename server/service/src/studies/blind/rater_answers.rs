@@ -5,8 +5,8 @@ use super::next_pair::next_pair;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
-use crate::studies::answer as answering;
-use crate::studies::pending_comparison::open_question;
+use crate::studies::pair_answer as answering;
+use crate::studies::pending_comparison::pending_comparison;
 use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
@@ -16,7 +16,7 @@ use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, NewBlindPair, NewPairAnswer, OrderedAnswer};
 use gaitwright_store::feedback::{self, Attribution, Source};
-use gaitwright_store::studies::{FeedbackMode, StudyState};
+use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::{
     BorrowedWriter, Connection, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
 };
@@ -53,17 +53,17 @@ pub struct AnswerReceipt {
 }
 
 /// The pending comparison of a study, the newer gait first. Computed outside any transaction.
-async fn question(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
+async fn pending_trials(store: &mut Store, study: StudyId) -> Result<Option<(TrialId, TrialId)>, Error> {
     let mut db = store.read().await?;
     let study = studies::get(&mut db, study).await?;
     consents::may_be_shown(&mut db, study.id).await?;
     let study_id = study.id;
-    if study.plan.feedback_mode == FeedbackMode::Automatic || study.state == StudyState::Stopped {
+    if study.plan.answer_source == AnswerSource::GaitRmse || study.state == StudyState::Stopped {
         return Ok(None);
     }
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let found = store.compute(move |pool| open_question(pool, &snapshot)).await?;
+    let found = store.compute(move |pool| pending_comparison(pool, &snapshot)).await?;
     // The learner's error may name bounds, so the rater sees only an internal error.
     let found =
         found.map_err(|error| Error::Internal(format!("choosing the comparison of study {study_id}: {error}")))?;
@@ -88,7 +88,7 @@ pub async fn next<'a>(
     caller: &Caller,
     study: StudyId,
 ) -> Result<(BorrowedWriter<'a>, Option<HandedOut>), Error> {
-    let question = question(store, study).await?;
+    let pending = pending_trials(store, study).await?;
     let mut writer = store.write().await?;
     let safety_reports = SafetyReports::read(&mut writer, study).await?;
     let mut own = blind_pairs::of_study(&mut writer, study).await?;
@@ -103,20 +103,20 @@ pub async fn next<'a>(
             && allocations::is_included(&mut writer, open.id).await?
         {
             note(&mut writer, caller, open, "blind_pair.show").await?;
-            let shown = own_pair(&mut writer, caller, &open.token).await?;
+            let shown = own_pair(&mut writer, caller, &open.code).await?;
             return Ok((writer, Some(HandedOut { shown, is_new: false })));
         }
         cancel(&mut writer, open).await?;
     }
-    let Some(pair) = question.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
+    let Some(pair) = pending.filter(|pair| !safety_reports.is_skipped(*pair)) else { return Ok((writer, None)) };
     // The study may go on asking others; this person has answered, here or elsewhere.
     if !walkable::are_walkable(&mut writer, pair).await? || is_answered(&mut writer, study, pair, &caller.name).await? {
         return Ok((writer, None));
     }
     let next = next_pair(RandomDraw::draw()?.number(), pair, &own, &reported);
-    let token = secret::fresh()?;
+    let code = secret::fresh()?;
     let new = NewBlindPair {
-        token: token.clone(),
+        code: code.clone(),
         study_id: study,
         rater: caller.name.clone(),
         number: u32::try_from(own.len()).unwrap_or(u32::MAX).saturating_add(1),
@@ -127,7 +127,7 @@ pub async fn next<'a>(
     };
     let id = blind_pairs::insert(&mut writer, &new).await?;
     allocations::of_pair(&mut writer, id, next.same_sides_as, RandomDraw::draw()?).await?;
-    let shown = own_pair(&mut writer, caller, &token).await?;
+    let shown = own_pair(&mut writer, caller, &code).await?;
     note(&mut writer, caller, &shown.pair, "blind_pair.draw").await?;
     Ok((writer, Some(HandedOut { shown, is_new: true })))
 }
@@ -181,10 +181,10 @@ async fn note(writer: &mut Writer, caller: &Caller, shown: &BlindPair, action: &
 pub async fn answer(
     writer: &mut Writer,
     caller: &Caller,
-    token: &str,
+    code: &str,
     given: &RaterAnswer,
 ) -> Result<(StudyId, AnswerReceipt), Error> {
-    let sided = own(writer, caller, token).await?;
+    let sided = own(writer, caller, code).await?;
     let shown = &sided.pair;
     answering::refuse_retracted(given.answer)?;
     printable::note("note", &given.note, 2000)?;
@@ -266,8 +266,8 @@ pub fn sides_in_words(answer: OrderedAnswer) -> &'static str {
 ///
 /// # Errors
 /// [`Error::NotFound`] for another rater's pair, [`Error::Conflict`] if the answer cannot be retracted.
-pub async fn retract(writer: &mut Writer, caller: &Caller, token: &str) -> Result<AnswerReceipt, Error> {
-    let shown = own(writer, caller, token).await?.pair;
+pub async fn retract(writer: &mut Writer, caller: &Caller, code: &str) -> Result<AnswerReceipt, Error> {
+    let shown = own(writer, caller, code).await?.pair;
     if !can_be_retracted(writer, &shown).await? {
         let why = "Only the last answer can be retracted, and only once. A safety report cannot be retracted: staff \
                    review it.";
@@ -298,12 +298,12 @@ pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<
     Ok(last && is_retractable)
 }
 
-/// The pair of a token with its sides, if it belongs to this rater and the rater can access its study.
+/// The pair of a code with its sides, if it belongs to this rater and the rater can access its study.
 ///
 /// # Errors
-/// What the record reports, and [`Error::NotFound`] for a token that is not of this rater.
-pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
-    let shown = own_pair(db, caller, token).await?;
+/// What the record reports, and [`Error::NotFound`] for a code that is not of this rater.
+pub async fn own(db: &mut Connection, caller: &Caller, code: &str) -> Result<PairWithSides, Error> {
+    let shown = own_pair(db, caller, code).await?;
     if !members::reaches(db, caller.reach(), shown.pair.study_id).await? {
         return Err(unknown_pair());
     }
@@ -311,22 +311,22 @@ pub async fn own(db: &mut Connection, caller: &Caller, token: &str) -> Result<Pa
     Ok(shown)
 }
 
-/// The pair of a token, if its motions may still be shown to this rater.
+/// The pair of a code, if its motions may still be shown to this rater.
 ///
 /// # Errors
 /// As [`own`], and [`Error::Conflict`] if a gait of the pair must no longer be shown.
-pub async fn own_showable_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
-    let shown = own(db, caller, token).await?;
+pub async fn own_showable_pair(db: &mut Connection, caller: &Caller, code: &str) -> Result<PairWithSides, Error> {
+    let shown = own(db, caller, code).await?;
     if !walkable::are_walkable(db, shown.pair.trials()).await? {
         return Err(Error::conflict(NO_LONGER_SHOWN));
     }
     Ok(shown)
 }
 
-async fn own_pair(db: &mut Connection, caller: &Caller, token: &str) -> Result<PairWithSides, Error> {
-    allocations::own_pair(db, token, &caller.name).await?.ok_or_else(unknown_pair)
+async fn own_pair(db: &mut Connection, caller: &Caller, code: &str) -> Result<PairWithSides, Error> {
+    allocations::own_pair(db, code, &caller.name).await?.ok_or_else(unknown_pair)
 }
 
 fn unknown_pair() -> Error {
-    Error::NotFound { what: "blind pair".to_owned(), id: "with this token".to_owned() }
+    Error::NotFound { what: "blind pair".to_owned(), id: "with this code".to_owned() }
 }

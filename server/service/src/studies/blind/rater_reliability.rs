@@ -67,11 +67,11 @@ pub struct RaterReliability {
 pub async fn of_study(db: &mut Connection, study: StudyId) -> Result<Vec<RaterReliability>, Error> {
     let shown = blind_pairs::of_study(db, study).await?;
     let sides = allocations::of_unblinded_raters(db, study).await?;
-    Ok(figures(&shown, &sides))
+    Ok(reliability(&shown, &sides))
 }
 
-/// The figures of every rater of a study, by name. `sides` has the allocations of unblinded raters.
-fn figures(pairs: &[BlindPair], sides: &[PairWithSides]) -> Vec<RaterReliability> {
+/// The reliability of every rater of a study, by name. `sides` has the allocations of unblinded raters.
+fn reliability(pairs: &[BlindPair], sides: &[PairWithSides]) -> Vec<RaterReliability> {
     let mut raters: Vec<&str> = pairs.iter().map(|shown| shown.rater.as_str()).collect();
     raters.sort_unstable();
     raters.dedup();

@@ -74,7 +74,7 @@ pub async fn unblind(
 ) -> Result<Vec<UnblindedPair>, Error> {
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
-    let reason = printable::reason("reason", reason, " that say why the rater is unblinded")?;
+    let reason = printable::reason("reason", reason, ", the reason for unblinding")?;
     if !blind_pairs::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
         return Err(Error::invalid("rater", rater, "a rater who was shown a pair of this study"));
     }
@@ -88,6 +88,6 @@ pub async fn unblind(
         ));
     }
     let detail = json!({ "rater": rater, "reason": reason });
-    audit::append(writer, &caller.actor, "study.unblind", &format!("study {study}"), &detail).await?;
+    audit::append(writer, &caller.actor, "study.unblind_rater", &format!("study {study}"), &detail).await?;
     Ok(pairs.iter().map(UnblindedPair::from).collect())
 }

@@ -3,7 +3,7 @@
 
 use super::session::still_shown;
 use super::session_view::gait_of;
-use super::upload::{EmgReading, MotionReading, WHAT};
+use super::upload::{EmgReading, JointAngleReading, WHAT};
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
@@ -62,9 +62,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
     }
     drop(db);
     if files.first().is_none_or(|(walk, ..)| *walk != 1) {
-        return Err(Error::conflict(
-            "Walk 1 has no EMG recording, with which the other walks are compared. Upload it first.",
-        ));
+        return Err(Error::conflict("Upload the EMG recording of walk 1 first. The other walks are compared with it."));
     }
     let process = move |pool: &OnPool| {
         let mut walks: Vec<WalkActivity> = Vec::new();
@@ -196,15 +194,15 @@ pub struct LimitCycles {
 pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<LimitCycles>, Error> {
     let mut db = store.read().await?;
     let recordings = measurement_files::of_session(&mut db, id).await?;
-    let mut files: Vec<(u8, MeasurementFileId, MotionReading, PackedText)> = Vec::new();
-    for recording in newest(&recordings, MeasurementKind::Motion) {
+    let mut files: Vec<(u8, MeasurementFileId, JointAngleReading, PackedText)> = Vec::new();
+    for recording in newest(&recordings, MeasurementKind::JointAngles) {
         let (reading, file) = measurement_files::file(&mut db, recording.id).await?;
         files.push((recording.walk, recording.id, reading, file));
     }
     drop(db);
     let process = move |pool: &OnPool| {
         let cycles =
-            |(walk, measurement_file_id, reading, file): (u8, MeasurementFileId, MotionReading, PackedText)| {
+            |(walk, measurement_file_id, reading, file): (u8, MeasurementFileId, JointAngleReading, PackedText)| {
                 let joints = reading.portraits(&file.text(pool)?)?;
                 Ok(LimitCycles { walk, measurement_file_id, cutoff_hz: reading.cutoff_hz, joints })
             };

@@ -5,8 +5,8 @@
 //! controller files; if a person fetches one, the record says so. Measurements and the subject's answer refer to walk
 //! numbers, and the answer reaches the learner at unblinding.
 
-mod answer;
 mod emg_preview;
+mod lab_answer;
 mod measurement_results;
 mod question;
 mod session;
@@ -14,9 +14,9 @@ mod session_view;
 mod unblinding;
 mod upload;
 
-pub use answer::{NewAnswer, give as answer, retract};
 pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
+pub use lab_answer::{NewAnswer, give as answer, retract};
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
     with_model,
@@ -26,9 +26,9 @@ pub use session::{
     GaitOfWalk, LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, for_device, gaits_to_plan_with,
     gaits_to_walk_with, plan, record_walk, session_progress, still_open, was_recorded,
 };
-pub use session_view::{Condition, LabSessionState, LabSessionView, WalkView};
+pub use session_view::{LabSessionState, LabSessionView, WalkCondition, WalkView};
 pub use unblinding::unblind;
 pub use upload::{
-    CheckedFile, EmgReading, MeasurementFormat, MotionReading, NewEmg, NewMotion, UploadedFile, check_kept,
+    CheckedFile, EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles, UploadedFile, check_kept,
     read_upload, store_upload,
 };

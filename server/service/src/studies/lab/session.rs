@@ -9,8 +9,8 @@ use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
+use gaitwright_store::trial_query::{self, ListedTrial, Listing};
 use gaitwright_store::trials::{self, Trial, TrialState};
-use gaitwright_store::trials_table::{self, ListedTrial, Listing};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -96,7 +96,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
     };
     let grounds = Grounds::read(db, study).await?;
     let mut kept: Vec<(ListedTrial, Trial)> = Vec::new();
-    for listed in trials_table::of_study(db, study, &listing).await? {
+    for listed in trial_query::of_study(db, study, &listing).await? {
         let trial = trials::get(db, listed.id).await?;
         if grounds.admit(&trial).is_ok() && !kept.iter().any(|(_, other)| is_same_gait(other, &trial)) {
             kept.push((listed, trial));
@@ -176,7 +176,7 @@ pub async fn plan(
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct LabSessionProgress {
     /// Identifier of the session.
-    pub session: LabSessionId,
+    pub lab_session_id: LabSessionId,
     /// Next walk, 1 to 3. Null after the last walk and in a closed session.
     pub walk: Option<u8>,
     /// Number of walks.
@@ -211,7 +211,7 @@ pub async fn session_progress(db: &mut Connection, id: LabSessionId) -> Result<L
     let session = still_shown(db, id).await?;
     let closed = session.done(SessionStep::Closed).is_some();
     Ok(LabSessionProgress {
-        session: id,
+        lab_session_id: id,
         walk: next_walk(&session).filter(|_| !closed && session.answer().is_none()),
         walks: WALKS,
         last_recorded: (1..=WALKS).rev().find_map(|walk| session.done(SessionStep::Walk(walk))).map(|done| done.at),
@@ -259,7 +259,7 @@ pub async fn record_walk(
     }
     lab_sessions::add_step(writer, actor, id, SessionStep::Walk(walk), &walked.note).await?;
     let detail = json!({ "walk": walk, "note": walked.note });
-    audit::append(writer, actor, "lab_session.walk", &format!("lab session {id}"), &detail).await?;
+    audit::append(writer, actor, "lab_session.record_walk", &format!("lab session {id}"), &detail).await?;
     session_progress(writer, id).await
 }
 

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 /// Condition of a walk: `normal`, without the device; `gait_a` and `gait_b`, with that gait of the session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Condition {
+pub enum WalkCondition {
     /// Without the device.
     Normal,
     /// With gait A.
@@ -59,7 +59,7 @@ pub struct WalkView {
     /// Number of the walk, 1 to 3.
     pub number: u8,
     /// Condition of the walk. Absent while it is blinded.
-    pub condition: Option<Condition>,
+    pub condition: Option<WalkCondition>,
     /// Who recorded the walk, and when.
     pub recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
@@ -139,19 +139,19 @@ impl From<&LabSession> for LabSessionView {
 }
 
 /// The condition of a walk; `None` while it is blinded.
-fn condition(session: &LabSession, walk: u8) -> Option<Condition> {
+fn condition(session: &LabSession, walk: u8) -> Option<WalkCondition> {
     if walk == 1 {
-        return Some(Condition::Normal);
+        return Some(WalkCondition::Normal);
     }
     let one_first = session.allocation.gait_a_first?;
-    Some(if one_first == (walk == 2) { Condition::GaitA } else { Condition::GaitB })
+    Some(if one_first == (walk == 2) { WalkCondition::GaitA } else { WalkCondition::GaitB })
 }
 
 /// The gait of a walk; `None` without the device, and while the session is blinded.
 pub(super) fn gait_of(session: &LabSession, walk: u8) -> Option<TrialId> {
     match condition(session, walk)? {
-        Condition::Normal => None,
-        Condition::GaitA => Some(session.trial_a),
-        Condition::GaitB => Some(session.trial_b),
+        WalkCondition::Normal => None,
+        WalkCondition::GaitA => Some(session.trial_a),
+        WalkCondition::GaitB => Some(session.trial_b),
     }
 }

@@ -1,6 +1,6 @@
 //! Unblinding of a lab session.
 
-use super::answer;
+use super::lab_answer;
 use super::session::{not_included, still_shown};
 use crate::error::Error;
 use crate::printable;
@@ -16,7 +16,7 @@ use serde_json::json;
 /// [`Error::Invalid`] without a reason, [`Error::Conflict`] if it is already unblinded, or its allocation is not in
 /// this record.
 pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
-    let reason = printable::reason("reason", reason, " that say why the session is unblinded")?;
+    let reason = printable::reason("reason", reason, ", the reason for unblinding")?;
     if !still_shown(writer, id).await?.allocation.included {
         return Err(not_included());
     }
@@ -26,6 +26,6 @@ pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reaso
     let detail = json!({ "reason": reason });
     audit::append(writer, actor, "lab_session.unblind", &format!("lab session {id}"), &detail).await?;
     let session = lab_sessions::get(writer, id).await?;
-    answer::record_answer(writer, &session).await?;
+    lab_answer::record_answer(writer, &session).await?;
     Ok(session)
 }

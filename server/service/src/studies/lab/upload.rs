@@ -180,7 +180,7 @@ pub struct NewEmg {
 /// How to read a file with joint angles.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, ToSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct MotionReading {
+pub struct JointAngleReading {
     /// File format. A CSV file has `time_s` and any of torso_rad, hip_L_rad, knee_L_rad, ankle_L_rad, hip_R_rad,
     /// knee_R_rad, ankle_R_rad.
     pub format: MeasurementFormat,
@@ -193,13 +193,13 @@ pub struct MotionReading {
     pub file_name: Option<String>,
 }
 
-impl Default for MotionReading {
+impl Default for JointAngleReading {
     fn default() -> Self {
         Self { format: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0, file_name: None }
     }
 }
 
-impl MotionReading {
+impl JointAngleReading {
     /// The phase portraits of a file.
     ///
     /// # Errors
@@ -229,7 +229,7 @@ impl MotionReading {
 /// Joint angles of a walk.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct NewMotion {
+pub struct NewJointAngles {
     /// Number of the walk.
     #[schema(minimum = 1, maximum = 3)]
     pub walk: u8,
@@ -237,7 +237,7 @@ pub struct NewMotion {
     pub recording: String,
     /// How to read the file.
     #[serde(default)]
-    pub reading: MotionReading,
+    pub reading: JointAngleReading,
 }
 
 /// Longest name of a file, characters.
@@ -270,7 +270,7 @@ impl NewEmg {
     }
 }
 
-impl NewMotion {
+impl NewJointAngles {
     /// Reads and checks the file on the thread pool.
     ///
     /// # Errors
@@ -279,7 +279,7 @@ impl NewMotion {
         let check = move |pool: &OnPool| {
             let walk = checked_walk(self.walk)?;
             self.reading.check(&self.recording)?;
-            let packed = PackedFile::new(pool, MeasurementKind::Motion, &self.reading, &self.recording)?;
+            let packed = PackedFile::new(pool, MeasurementKind::JointAngles, &self.reading, &self.recording)?;
             Ok(CheckedFile { walk, packed })
         };
         store.compute(check).await?
@@ -297,8 +297,8 @@ pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &MeasurementFile
             let (reading, file) = measurement_files::file::<EmgReading>(db, id).await?;
             pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }
-        MeasurementKind::Motion => {
-            let (reading, file) = measurement_files::file::<MotionReading>(db, id).await?;
+        MeasurementKind::JointAngles => {
+            let (reading, file) = measurement_files::file::<JointAngleReading>(db, id).await?;
             pool.run(move |pool| reading.check(&file.text(pool)?)).await?
         }
     }
@@ -355,6 +355,6 @@ pub async fn store_upload(
     }
     let added = measurement_files::insert(writer, actor, id, walk, &checked.packed).await?;
     let detail = json!({ "walk": walk, "kind": added.kind, "recording": added.id, "sha256": added.raw_sha256 });
-    audit::append(writer, actor, "lab_session.record", &format!("lab session {id}"), &detail).await?;
+    audit::append(writer, actor, "lab_session.upload", &format!("lab session {id}"), &detail).await?;
     Ok(added)
 }

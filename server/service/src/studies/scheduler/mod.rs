@@ -9,7 +9,7 @@ mod message_loop;
 mod planning_loop;
 mod prefetch_loop;
 
-use super::belief::Beliefs;
+use super::analysis::Analyses;
 use super::execution::{NewExecutionReport, Simulation};
 use super::explanation::ExplanationEffort;
 use super::jobs_after_solves::JobsAfterSolves;
@@ -47,7 +47,7 @@ struct Inner {
     waiting: watch::Sender<Arc<[Arc<StudySnapshot>]>>,
     /// Certificates, explanations and execution reports.
     after_solves: Option<JobsAfterSolves>,
-    beliefs: Arc<Beliefs>,
+    analyses: Arc<Analyses>,
     /// Held from the search for a free worker until the engine has the job, so that a prefetch never takes the worker
     /// of a trial.
     hand_over: Mutex<()>,
@@ -84,12 +84,12 @@ impl Scheduler {
     ) -> Self {
         // A separate pool, so that requests cannot delay planning.
         let store = store.with_own_pool();
-        let beliefs = Arc::<Beliefs>::default();
+        let analyses = Arc::<Analyses>::default();
         Self(Arc::new(Inner {
-            after_solves: after_solves.map(|by| JobsAfterSolves::new(&store, by, &beliefs)),
+            after_solves: after_solves.map(|by| JobsAfterSolves::new(&store, by, &analyses)),
             unpacking: store.with_own_pool(),
             store,
-            beliefs,
+            analyses,
             engine,
             running_solves: Arc::default(),
             prefetches: Prefetches::default(),
@@ -116,8 +116,8 @@ impl Scheduler {
     }
 
     /// Cached posteriors of studies.
-    pub fn beliefs(&self) -> &Arc<Beliefs> {
-        &self.0.beliefs
+    pub fn analyses(&self) -> &Arc<Analyses> {
+        &self.0.analyses
     }
 
     /// Number of solves that can run in parallel.

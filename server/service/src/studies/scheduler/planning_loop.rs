@@ -8,7 +8,7 @@ use super::{HEARTBEATS_PER_LEASE, Scheduler};
 use crate::error::Error;
 use crate::supervise::Task;
 use gaitwright_compute::OnPool;
-use gaitwright_store::studies::{self, FeedbackMode, Study, StudyState};
+use gaitwright_store::studies::{self, AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
 use gaitwright_store::{commit, events, jobs};
 use serde_json::json;
@@ -101,9 +101,9 @@ impl Scheduler {
             let snapshot = StudySnapshot::read(&mut reader, study.clone()).await?;
             drop(reader);
             self.certify_for_people(&snapshot);
-            let beliefs = Arc::clone(&self.0.beliefs);
+            let analyses = Arc::clone(&self.0.analyses);
             let decide = move |pool: &OnPool| {
-                let step = next_step(pool, &snapshot, &beliefs);
+                let step = next_step(pool, &snapshot, &analyses);
                 (snapshot, step)
             };
             let (snapshot, step) = store.compute(decide).await?;
@@ -126,7 +126,7 @@ impl Scheduler {
 
     /// Requests the certificates that gaits still lack, because people are shown certified gaits only.
     pub(super) fn certify_for_people(&self, snapshot: &StudySnapshot) {
-        if snapshot.study.plan.feedback_mode != FeedbackMode::Automatic {
+        if snapshot.study.plan.answer_source != AnswerSource::GaitRmse {
             for trial in snapshot.trials.iter().filter(|trial| snapshot.waits_for_certificate(trial)) {
                 self.certify(trial.id);
             }

@@ -38,7 +38,11 @@ pub async fn reach(url: &str) -> Result<String, DispatchError> {
     let options = async_nats::ConnectOptions::new().connection_timeout(REACHED_WITHIN);
     let client = options.connect(url).await.map_err(unreachable)?;
     let about = client.server_info();
-    if about.jetstream { Ok(about.version) } else { Err(unreachable("it runs without JetStream")) }
+    if about.jetstream {
+        Ok(about.version)
+    } else {
+        Err(DispatchError::Unreachable("The NATS broker runs without JetStream. Enable it on the broker.".to_owned()))
+    }
 }
 
 impl BrokerConnection {

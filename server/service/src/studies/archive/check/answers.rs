@@ -1,13 +1,13 @@
 //! Checks the answers in an imported archive: each against its trials, and how often a person answered.
 
-use super::super::file::refuse;
+use super::super::archive_file::refuse;
 use super::context::{at, of_gaits};
 use crate::error::Error;
 use crate::printable;
 use crate::studies::pending_comparison::by_gait_rmse;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::lab_sessions::LabSession;
-use gaitwright_store::studies::{FeedbackMode, Study};
+use gaitwright_store::studies::{AnswerSource, Study};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
     Connection, FeedbackId, Instant, SafetyReportId, TrialId, assessments, blind_pairs, feedback, safety_reports,
@@ -97,7 +97,7 @@ fn sorted(a: TrialId, b: TrialId) -> (TrialId, TrialId) {
 fn pair(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
     match *content {
         FeedbackContent::Preference { winner, loser } => Some(sorted(winner, loser)),
-        FeedbackContent::Tie { a, b } => Some(sorted(a, b)),
+        FeedbackContent::NoDifference { a, b } => Some(sorted(a, b)),
         FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
     }
 }
@@ -126,7 +126,7 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
                 return Err(format!("the source of a label is {source}; it must be convergence or script"));
             }
         }
-        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::Tie { a, b } => {
+        FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::NoDifference { a, b } => {
             let (a, b) = (trial(a)?, trial(b)?);
             after_both(row.created_at, [a, b])?;
             if a.state != TrialState::Converged || b.state != TrialState::Converged {
@@ -135,7 +135,7 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
             match row.source {
                 Source::Convergence => return Err("a preference cannot have the source convergence".to_owned()),
                 Source::GaitRmse => {
-                    if study.plan.feedback_mode == FeedbackMode::Human {
+                    if study.plan.answer_source == AnswerSource::People {
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());
                     }
                     let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {

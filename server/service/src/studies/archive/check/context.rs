@@ -1,6 +1,6 @@
 //! What the checks of an imported archive share.
 
-use super::super::file::refuse;
+use super::super::archive_file::refuse;
 use crate::error::Error;
 use gait_optimizer::ReferenceGait;
 use gaitwright_store::TrialId;

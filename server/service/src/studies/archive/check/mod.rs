@@ -5,7 +5,7 @@ mod answers;
 mod context;
 mod trial_results;
 
-use super::file::refuse;
+use super::archive_file::refuse;
 use crate::access::Reach;
 use crate::error::Error;
 use crate::printable;
@@ -13,15 +13,15 @@ use crate::studies::lab::EmgResult;
 use crate::studies::{device, lab, reference_import, study_change, study_plan, subject};
 use context::{Context, at, of_gaits};
 use gaitwright_compute::Pool;
-use gaitwright_store::archive::Definition;
 use gaitwright_store::archived_row::{Cell, Row};
+use gaitwright_store::archived_rows::Definition;
 use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::quarantine::Quarantine;
 use gaitwright_store::studies::StudyFilter;
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{
-    Connection, Instant, StudyId, TrialId, archive, devices, lab_sessions, measurement_files, now, reference_gaits,
-    studies, subjects, trials,
+    Connection, Instant, StudyId, TrialId, archived_rows, devices, lab_sessions, measurement_files, now,
+    reference_gaits, studies, subjects, trials,
 };
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -107,10 +107,10 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
     )?;
     let device = at("device", devices::get(db, study.plan.device_id).await)?.definition;
     at("device", device::check(&device))?;
-    of_definition("devices", &device.name, &at("devices", archive::definition(db, "devices").await)?)?;
+    of_definition("devices", &device.name, &at("devices", archived_rows::definition(db, "devices").await)?)?;
     let reference = at("reference gait", reference_gaits::get(db, study.plan.reference_gait_id).await)?.definition;
     at("reference gait", reference_import::check(&reference))?;
-    let written = at("reference_gaits", archive::definition(db, "reference_gaits").await)?;
+    let written = at("reference_gaits", archived_rows::definition(db, "reference_gaits").await)?;
     of_definition("reference_gaits", &reference.name, &written)?;
 
     let id = study.id;
@@ -130,12 +130,12 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
             }
         }
         earlier.insert(trial.id);
-        at(&what, trial_results::figures(trial, &context.study.plan))?;
+        at(&what, trial_results::values(trial, &context.study.plan))?;
         let has_gait = at(&what, trial_results::gait(db, pool, trial, &context).await)?;
         unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
         at(&what, trial_results::check_results(db, trial).await)?;
     }
-    if let Some(number) = at("jobs", archive::trial_unlike_its_job(db).await)? {
+    if let Some(number) = at("jobs", archived_rows::trial_unlike_its_job(db).await)? {
         return Err(refuse(format!("trial {number}: its state contradicts its job")));
     }
     let by_id: HashMap<TrialId, &Trial> = trials.iter().map(|trial| (trial.id, trial)).collect();

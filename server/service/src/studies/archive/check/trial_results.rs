@@ -1,7 +1,7 @@
-//! Checks the trials of an imported archive: their figures, gaits and results.
+//! Checks the trials of an imported archive: their values, gaits and results.
 
 use super::context::Context;
-use crate::studies::{search_space, trial_state};
+use crate::studies::{bound_grid, trial_transitions};
 use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
 use gait_optimizer::{Gait, GaitResults, ReferenceGait, WarmStart};
@@ -16,11 +16,11 @@ use std::sync::Arc;
 const HIP_PROGRESS_M: f64 = 1e-5;
 
 /// Checks an action, and the results of a trial against its state and its report.
-pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
+pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     if trial.action_index.0 >= plan.search_space.len() {
         return Err(format!("action_index {} is not in the search space", trial.action_index.0));
     }
-    let action = search_space::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
+    let action = bound_grid::bounds_of(&plan.search_space, plan.base_bounds, trial.action_index);
     if action.map_err(|e| e.to_string())? != trial.action {
         return Err("the action does not match its index".to_owned());
     }
@@ -39,7 +39,7 @@ pub(super) fn figures(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         let none = trial.report.is_none() && trial.status.is_none();
         return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
     }
-    let state = trial.status.and_then(trial_state::result_of);
+    let state = trial.status.and_then(trial_transitions::result_of);
     if state != Some(trial.state) {
         return Err(format!("status {:?} contradicts the state {}", trial.status, trial.state.as_str()));
     }
@@ -118,7 +118,7 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
     if warm_start.muscles != plan.muscles || warm_start.mesh != plan.gait_settings.mesh {
         return Err("its warm start belongs to another problem".to_owned());
     }
-    same_figures(trial, gait, &context.reference)?;
+    same_values(trial, gait, &context.reference)?;
     if trial.state == TrialState::Converged {
         let error = progress_error_m(gait).map_err(|e| e.to_string())?;
         let follows = error <= HIP_PROGRESS_M;
@@ -129,8 +129,8 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
     Ok(())
 }
 
-/// Checks every stated figure that the gait determines. Safety reports recognise a motion by these figures.
-fn same_figures(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
+/// Checks every stated value that the gait determines. Safety reports recognise a motion by these values.
+fn same_values(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<(), String> {
     let Some(report) = &trial.report else { return Ok(()) };
     let anew = GaitResults::of(gait, reference).map_err(|e| e.to_string())?;
     match GaitResults::of_report(report).difference(&anew) {
