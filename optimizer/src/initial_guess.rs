@@ -1,8 +1,8 @@
 //! The initial guess of a cold start, computed from the reference gait.
 //!
 //! 1. [`posture`]: joint angles near the reference gait with exact contacts, by sequential convex QPs (Clarabel)
-//! 2. [`motion`]: Bezier fits in each domain, their derivatives, and consistent torques and forces by least squares
-//! 3. [`muscles`]: non-negative muscle forces by convex QPs (Clarabel), then tendon, fibre and activation
+//! 2. [`guessed_motion`]: Bezier fits in each domain, their derivatives, and consistent torques and forces by least squares
+//! 3. [`guessed_muscles`]: non-negative muscle forces by convex QPs (Clarabel), then tendon, fibre and activation
 //!
 //! No step fails: if bounds make a QP infeasible, its constraints are relaxed, and the gait problem decides whether a
 //! gait exists.

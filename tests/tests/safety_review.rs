@@ -114,7 +114,7 @@ async fn gait_cleared_by_staff_is_recommended_again() {
     let best_id = best.as_str().unwrap();
     let for_the_device = service.fetch(&format!("/api/v1/trials/{best_id}/controller.json")).await;
     assert_eq!(for_the_device.status, StatusCode::CONFLICT);
-    assert!(for_the_device.text.contains("Nobody may walk with it until"), "{}", for_the_device.text);
+    assert!(for_the_device.text.contains("Do not walk with it until"), "{}", for_the_device.text);
     let seen = safety_reports(&service, study).await[0]["id"].clone();
     service.post(&address, &json!({"trial_a": best, "trial_b": other, "answer": "unsafe_a", "author": "K3"})).await;
     let late = decide(&service, best_id, &json!({"decision": "cleared", "reason": "r", "reports": [seen]})).await;

@@ -46,7 +46,7 @@ async fn browser_staff_answer_with_one_click_and_undo_within_five_seconds() {
     page.click("[data-undo] button").await;
     page.wait_until("document.querySelector('.notice.good')?.textContent.includes('(retracted)') ?? false").await;
     let undone = answers(&site, study, "K1").await.remove(0).retraction.unwrap();
-    assert_eq!((undone.author.as_str(), undone.reason.as_str()), ("K1", "undone right after the answer"));
+    assert_eq!((undone.author.as_str(), undone.reason.as_str()), ("K1", "undone immediately after answering"));
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

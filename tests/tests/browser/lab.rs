@@ -184,7 +184,7 @@ async fn browser_staff_report_a_gait_as_unsafe_and_cannot_retract_the_report() {
     compare.unfold().await;
     compare.click(&compare.answer("unsafe_a").await).await;
     compare.wait_for(".notice.good").await;
-    assert!(compare.text(".notice.good").await.contains(&format!("{best} is unsafe")));
+    assert!(compare.text(".notice.good").await.contains(&format!("{best} was reported as unsafe")));
     // The study page updates without reloading, and recommends another gait.
     page.wait_for("[data-part=state] [role=alert]").await;
     page.wait_until(&format!("document.querySelector('[data-part=best] a').innerText !== '{best}'")).await;

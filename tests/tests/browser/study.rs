@@ -406,7 +406,7 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     plain.click_plainly(".notice.good [data-undo] button").await;
     plain.wait_for(".notice.good a[href*='a=']").await;
     let undone = site.service.feedback(study).await.into_iter().find(|row| row.author == "K2").unwrap();
-    assert_eq!(undone.retraction.unwrap().reason, "undone right after the answer");
+    assert_eq!(undone.retraction.unwrap().reason, "undone immediately after answering");
     plain.click_plainly(".notice.good a[href*='a=']").await;
     plain.wait_for("#author").await;
     plain.click_plainly("#author").await;
