@@ -27,7 +27,7 @@ async fn service() -> (TempDir, Service) {
 async fn script_study(service: &Service, trials: u32, parallel: u32) -> StudyId {
     service
         .study(|new| {
-            (new.evaluation, new.number_of_trials, new.parallel_trials) = (Evaluation::Script, trials, parallel)
+            (new.evaluation, new.number_of_trials, new.parallel_trials) = (Evaluation::Script, trials, parallel);
         })
         .await
 }

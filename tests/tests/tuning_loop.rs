@@ -170,7 +170,7 @@ async fn study_ends_when_the_gait_of_every_action_is_known() {
             .await;
         let ended = service.wait_for(study, &[StudyState::Finished]).await;
         assert_eq!(service.trials(study).await.len(), expected);
-        assert_eq!(ended.state_reason.contains("has the gait of one that was tried"), expected == 1, "{ended:?}");
+        assert_eq!(ended.state_reason.contains("has the same gait as one that has"), expected == 1, "{ended:?}");
     }
     service.stop().await;
 }
