@@ -1,6 +1,6 @@
 //! The tuning loop, and the rules for studies and trials.
 //!
-//! The rules ([`lifecycle`], [`trial_state`], [`trial_choice`], [`pending_comparison`]) are pure functions of the record. The
+//! The rules ([`lifecycle`], [`trial_transitions`], [`trial_choice`], [`pending_comparison`]) are pure functions of the record. The
 //! [`Scheduler`](scheduler::Scheduler) applies them: it proposes trials, dispatches solves and records results. All its
 //! state is in the record, so a new process continues where a killed one stopped.
 
