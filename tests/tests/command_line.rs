@@ -169,9 +169,9 @@ fn file_other_than_a_database_is_refused_by_name_and_unchanged() {
     for command in [&["tune"][..], &["serve", "--listen", "127.0.0.1:0"], &["audit", "verify"], &["backup", "copy.db"]]
     {
         let with = |file| [command, &["--database", file]].concat();
-        refused_beside(&["notes.txt"], &with("notes.txt"), "notes.txt is not a gaitwright database");
+        refused_beside(&["notes.txt"], &with("notes.txt"), "notes.txt is not a Gaitwright database");
     }
-    refused_beside(&[], &["tune", "--database", "folder"], "folder is not a gaitwright database: it is a folder");
+    refused_beside(&[], &["tune", "--database", "folder"], "folder is not a Gaitwright database: it is a folder");
     refused_beside(&[], &["tune", "--database", "nowhere/a.db"], "Cannot open the database nowhere/a.db");
     // Only the first bytes are valid.
     let folder = tempfile::tempdir().unwrap();
@@ -181,7 +181,7 @@ fn file_other_than_a_database_is_refused_by_name_and_unchanged() {
     let output = gaitwright(folder.path(), &["tune", "--database", "a.db"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("a.db is not a gaitwright database"), "{text}");
+    assert!(text.contains("a.db is not a Gaitwright database"), "{text}");
     assert_eq!(cli::files(folder.path()), ["a.db"]);
 }
 

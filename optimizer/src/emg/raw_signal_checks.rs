@@ -69,8 +69,8 @@ impl EmgRecording {
         let share = rms(&signal_filter::filter(&band, &about_mean)) / rms(&about_mean);
         (share < LEAST_IN_BAND).then(|| {
             format!(
-                "{:.1} % of the signal (RMS) is within {band_low_hz} to {band_high_hz} Hz, less than {:.0} %. It looks \
-                 like an envelope or a movement artefact; upload the raw signal",
+                "only {:.1} % of the signal (RMS) is between {band_low_hz} and {band_high_hz} Hz; a raw signal has at least \
+                 {:.0} %. This looks like an envelope or a movement artefact; upload the raw signal",
                 100.0 * share,
                 100.0 * LEAST_IN_BAND
             )

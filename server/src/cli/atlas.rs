@@ -62,7 +62,7 @@ impl AtlasCommand {
         out.finish()?;
         tell(&format!("{}; written to {path}", finished.map.in_words()));
         if let Err(e) = finished.forget_progress() {
-            tell(&format!("gaitwright: cannot remove the file of solves: {e}"));
+            tell(&format!("gaitwright: cannot remove the progress file: {e}"));
         }
         Ok(CommandEnd::Done)
     }

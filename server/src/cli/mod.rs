@@ -78,7 +78,7 @@ enum Command {
     Worker(worker::WorkerCommand),
     /// Run an unattended study in which Gait RMSE, not a person, answers the comparisons.
     ///
-    /// If the record has an unfinished study with the same settings, continues it instead of creating another one.
+    /// If the record has an unfinished study with the same settings, continue it instead of creating another one.
     Tune(tune::TuneCommand),
     /// Reproduce the paper's comparison of gaits with and without muscles.
     Reproduce(reproduce::ReproduceCommand),

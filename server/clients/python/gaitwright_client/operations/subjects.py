@@ -146,7 +146,7 @@ class SubjectsMethods(Transport):
         *,
         page_size: Optional[int] = None,
     ) -> Pages[ReferenceGaitMatch]:
-        """List the nearest reference gaits of a subject.
+        """List the reference gaits nearest to a subject.
 
         Sorted by distance in height and body mass, the nearest first. Those without height and mass come last.
         """

@@ -99,7 +99,8 @@ async fn report_unsafe(
     let walked = session.walked();
     let (gaits, blinded) = match walked {
         Some(pair) => (new.answer.unsafe_of(pair), ""),
-        None => (vec![session.trial_a, session.trial_b], "; blinded, may be either gait"),
+        None if new.answer == OrderedAnswer::UnsafeBoth => (vec![session.trial_a, session.trial_b], ""),
+        None => (vec![session.trial_a, session.trial_b], "; blinded: it may be either gait"),
     };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,
