@@ -239,7 +239,7 @@ fn exported_gait_is_imported_with_the_same_curves() {
         assert!(
             within.ends_with(
                 "if the recording is exactly one stride, such as an exported gait, use its first and last rows as heel \
-                 strikes (ends)."
+                 strikes."
             ),
             "{within}"
         );

@@ -82,7 +82,7 @@ fn other_invalid_arguments_are_refused() {
     refused(&["solve", "--tolerance", "5"], "--tolerance is 5; it must be 1e-10 to 0.01.");
     refused(
         &["solve", "--reference", "foo"],
-        "There is no reference gait foo: give falisse-2019, fukuchi-2018 or a file. (No such file or directory)",
+        "There is no reference gait foo. Give the name of a built-in one (falisse-2019, fukuchi-2018) or an existing file.",
     );
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");

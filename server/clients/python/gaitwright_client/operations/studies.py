@@ -318,7 +318,7 @@ class StudiesMethods(Transport):
         )
 
     def list_compared_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
-        """List compared studies.
+        """List studies for comparison.
 
         Properties and results of several studies. A page has at most 5 studies, because each needs a posterior. Sorted
         as in `ids`.

@@ -76,7 +76,7 @@ pub async fn give(
     }
     if new.number != number {
         return Err(Error::conflict(format!(
-            "Answer {} was retracted. The current answer has number {number}.",
+            "Answer {} was retracted. The next answer has number {number}.",
             new.number
         )));
     }
