@@ -1,10 +1,10 @@
 //! The prefetch loop: while studies wait for an answer, idle workers solve the trials that may follow.
 
-use super::super::prefetch::LikelyNext;
 use super::super::snapshot::StudySnapshot;
 use super::super::solve_input::PackedInput;
 use super::Scheduler;
 use super::job_dispatch::assigned;
+use super::prefetched_solves::LikelyNext;
 use crate::error::Error;
 use crate::supervise::Task;
 use crate::workers::Attempt;
