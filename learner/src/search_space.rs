@@ -144,16 +144,6 @@ impl SearchSpace {
         Ok(Self { dimensions, len })
     }
 
-    /// The same actions for a learner to whom some dimensions do not matter: their levels are fully correlated.
-    #[must_use]
-    pub fn ignoring(&self, dimension: impl Fn(&Dimension) -> bool) -> Self {
-        let mut space = self.clone();
-        for ignored in space.dimensions.iter_mut().filter(|known| known.values.len() > 1 && dimension(known)) {
-            ignored.lengthscale = LONGEST_LENGTHSCALE * ignored.range();
-        }
-        space
-    }
-
     /// The dimensions, in order.
     pub fn dimensions(&self) -> &[Dimension] {
         &self.dimensions

@@ -4,7 +4,7 @@
 //! which 35 % do not converge. It uses splitmix64 only, so that other languages can reproduce it. `hart3` and `hart6`
 //! are the Hartmann functions on the grids of POLAR's examples.
 
-use gait_learner::{ActionIndex, Dimension, SearchSpace};
+use gait_learner::{ActionIndex, Dimension, LearnerError, SearchSpace};
 
 /// A grid with the utility of every action in `[0, 1]`.
 pub struct Problem {
@@ -36,6 +36,8 @@ pub struct Knowledge {
 
 /// Number of gaits from which on a dimension that was active in none of them is ignored.
 const FEWEST_GAITS: usize = 2;
+/// Factor on the lengthscale of a dimension that the learner ignores: its levels are fully correlated.
+const IGNORED: f64 = 1e4;
 
 impl Problem {
     /// The actions whose gait is that of a visited action, as boxes; `None` if the problem has no gaits.
@@ -50,13 +52,18 @@ impl Problem {
     }
 
     /// The search space of the learner after these actions.
-    pub fn space_after(&self, visited: &[ActionIndex], knowledge: Knowledge) -> SearchSpace {
+    pub fn space_after(&self, visited: &[ActionIndex], knowledge: Knowledge) -> Result<SearchSpace, LearnerError> {
         let gaits: Vec<&GaitOfAction> = self.gaits_of(visited).collect();
         if !knowledge.inactive || gaits.len() < FEWEST_GAITS {
-            return self.space.clone();
+            return Ok(self.space.clone());
         }
-        let place = |dimension: &Dimension| self.space.dimensions().iter().position(|d| d.name == dimension.name);
-        self.space.ignoring(|dimension| place(dimension).is_some_and(|d| gaits.iter().all(|gait| !gait.active[d])))
+        let mut dimensions = self.space.dimensions().to_vec();
+        for (d, dimension) in dimensions.iter_mut().enumerate() {
+            if gaits.iter().all(|gait| !gait.active[d]) {
+                dimension.lengthscale *= IGNORED;
+            }
+        }
+        SearchSpace::new(dimensions)
     }
 
     fn gaits_of(&self, visited: &[ActionIndex]) -> impl Iterator<Item = &GaitOfAction> {

@@ -51,7 +51,7 @@ pub fn run(
     let mut regrets = Vec::new();
     while regrets.len() <= comparisons {
         let mut proposed: Vec<ActionIndex> = Vec::new();
-        let space = problem.space_after(&log.visited, knowledge);
+        let space = problem.space_after(&log.visited, knowledge)?;
         while proposed.len() < batch {
             let seed = person.seed;
             let gaits = knowledge.gaits.then(|| problem.actions_with_gaits_of(&log.visited)).flatten();
@@ -64,14 +64,14 @@ pub fn run(
             });
         }
         for action in proposed {
-            let space = problem.space_after(&log.visited, knowledge);
+            let space = problem.space_after(&log.visited, knowledge)?;
             let comparisons = learner.proposed_comparisons(&space, &log, action, settings)?;
             if labelled {
                 log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
             }
             log.feedback.extend(comparisons.iter().filter_map(|comparison| person.compare(action, comparison.against)));
             log.visited.push(action);
-            let space = problem.space_after(&log.visited, knowledge);
+            let space = problem.space_after(&log.visited, knowledge)?;
             let best = learner.posterior(&space, &log, settings)?.best();
             // An action has been visited, so there is a best one.
             regrets.push(best.map_or(1.0, |best| 1.0 - problem.of(best).0));
