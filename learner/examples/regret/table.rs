@@ -100,7 +100,7 @@ impl Table {
                 let is_active = |name: &&str| cell(active).split(' ').any(|active| active == *name);
                 gaits[index] = GaitOfAction {
                     number: cell(number).parse().unwrap_or(0),
-                    active: header[..DIMENSIONS].iter().map(|name| is_active(name)).collect(),
+                    active: header[..DIMENSIONS].iter().map(is_active).collect(),
                 };
             }
             merits[index] = row.map(scaled);
