@@ -2547,6 +2547,8 @@ class _RecommendationRequired(Recommended):
     certifying: bool
     # Reasons if the certificate failed.
     failures: list[str]
+    # Tuned bounds that were active in no gait of the study so far.
+    never_active: list[str]
     # Name of the study.
     study: str
     # Identifier of the study.

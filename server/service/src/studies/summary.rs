@@ -1,6 +1,7 @@
 //! The summary of a study as one document, as `tune --json` prints it for scripts.
 
 use super::certified_best::{BestCertification, CertificateState};
+use super::equal_actions::never_active;
 use super::snapshot::StudySnapshot;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;
@@ -29,6 +30,8 @@ pub struct Summary {
     pub best_failures: Vec<String>,
     /// If it failed, the best trial whose gait passed.
     pub passing: Option<TrialSummary>,
+    /// Tuned bounds that were active in no gait so far.
+    pub never_active: Vec<String>,
     /// Every trial, by number.
     pub trials: Vec<TrialSummary>,
 }
@@ -73,6 +76,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, certification: BestCe
         best_certificate: certification.certificate,
         best_failures: certification.failures,
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
+        never_active: never_active(snapshot),
         trials: snapshot.trials.iter().map(|trial| line(trial, &snapshot.trials)).collect(),
     }
 }

@@ -1,6 +1,7 @@
 //! Records the result of a trial exactly once: state, label, gait and the preferences that Gait RMSE implies, in one
 //! transaction.
 
+use super::fold;
 use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
 use super::snapshot::StudySnapshot;
@@ -39,7 +40,7 @@ pub async fn ended(
             _ => broke(store, lease, "The solve ran out of time.").await,
         };
     };
-    let end = TrialEnd {
+    let mut end = TrialEnd {
         state,
         report: Some(outcome.report.clone()),
         violations: outcome.violations.clone(),
@@ -51,6 +52,11 @@ pub async fn ended(
         let study = studies::get(&mut reader, lease.study).await?;
         let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
+        if let Some(fold) =
+            snapshot.trial(lease.trial).and_then(|trial| fold::in_words(&snapshot, trial, &outcome.report))
+        {
+            end.message = fold;
+        }
         let answers = answers(store, &snapshot, lease.trial, &end).await?;
 
         let mut writer = store.write().await?;
