@@ -441,21 +441,21 @@ create table feedback (
     trial_a    text not null references trials (id),
     -- preference: the loser. no_difference: the other trial.
     trial_b    text references trials (id),
-    -- label: the ordinal category; 0 is not converged.
-    category   integer,
+    -- label: whether the evaluation of the trial found a gait.
+    label      text constraint feedback_label check (label in ('converged', 'not_converged')),
     -- suggestion: the index of the suggested action in the search space.
     suggested  integer,
     source     text not null
                constraint feedback_source
-               check (source in ('convergence', 'gait_rmse', 'subject', 'clinician', 'script')),
+               check (source in ('evaluation', 'gait_rmse', 'subject', 'clinician', 'script')),
     author     text not null constraint feedback_author_length check (length(author) between 1 and 80),
     note       text not null default '' constraint feedback_note_length check (length(note) <= 2000),
     created_at text not null,
     constraint feedback_shape check (
         case kind
-            when 'label' then trial_b is null and category is not null and suggested is null
-            when 'suggestion' then trial_b is null and category is null and suggested is not null
-            else trial_b is not null and category is null and suggested is null
+            when 'label' then trial_b is null and label is not null and suggested is null
+            when 'suggestion' then trial_b is null and label is null and suggested is not null
+            else trial_b is not null and label is null and suggested is null
         end
     ),
     constraint feedback_two_trials check (trial_b is null or trial_a <> trial_b)

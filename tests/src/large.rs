@@ -53,8 +53,8 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     .await
     .unwrap();
     sqlx::query(
-        "insert into feedback (id, study_id, kind, trial_a, category, source, author, created_at)
-         select printf('01890001-0000-7000-8%s-%012d', substr(study_id, 34, 3), number), study_id, 'label', id, 1, 'convergence', 'x', created_at from trials
+        "insert into feedback (id, study_id, kind, trial_a, label, source, author, created_at)
+         select printf('01890001-0000-7000-8%s-%012d', substr(study_id, 34, 3), number), study_id, 'label', id, 'converged', 'evaluation', 'x', created_at from trials
          where study_id = ?1 and number > ?2",
     )
     .bind(study.to_string())

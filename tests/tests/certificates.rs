@@ -324,7 +324,7 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
     let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 2)).await;
     for outcome in
-        [json!({"outcome": "converged", "gait_rmse_rad": 0.2}), json!({"outcome": "not_converged", "reason": "r"})]
+        [json!({"label": "converged", "gait_rmse_rad": 0.2}), json!({"label": "not_converged", "reason": "r"})]
     {
         let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
         let trial = asked["id"].as_str().unwrap();
@@ -337,7 +337,7 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
             assert!(reasons.iter().any(|reason| refused.text.contains(reason)), "{}", refused.text);
         }
         let page = service.fetch(&format!("/trials/{trial}?sensitivities=true")).await.text;
-        assert_eq!(page.contains("gives no solution to compute sensitivities from"), outcome["outcome"] == "converged");
+        assert_eq!(page.contains("gives no solution to compute sensitivities from"), outcome["label"] == "converged");
     }
     service.stop().await;
 }

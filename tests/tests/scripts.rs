@@ -41,7 +41,7 @@ async fn run(service: &Service, study: StudyId, script: &str, trials: usize) -> 
         let trial = asked.json();
         assert_eq!(asked.headers["location"], format!("/api/v1/trials/{}", trial["id"].as_str().unwrap()));
         let rmse = 0.1 + (trial["action"]["a5"].as_f64().unwrap() - 0.026).abs();
-        let told = json!({"outcome": "converged", "gait_rmse_rad": rmse});
+        let told = json!({"label": "converged", "gait_rmse_rad": rmse});
         let told = service.post(&format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap()), &told).await;
         assert_eq!(told.status, StatusCode::OK, "{}", told.text);
         assert_eq!(told.json()["state"], "converged");
@@ -58,7 +58,7 @@ async fn lab_script_finishes_a_study_and_two_runs_give_the_same_trials() {
     let finished = service.wait_for(first, &[StudyState::Finished]).await;
     assert!(finished.state_reason.contains("All 8 trials"));
     let feedback = service.feedback(first).await;
-    assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "convergence").count(), 8);
+    assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "evaluation").count(), 8);
     assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "gait_rmse").count(), 7);
 
     let second = script_study(&service, 8, 1).await;
@@ -105,19 +105,19 @@ async fn proposal_stays_with_its_worker() {
 
     let tell = format!("/api/v1/trials/{}/tell", left["id"].as_str().unwrap());
     for (body, field) in [
-        (json!({"outcome": "not_converged"}), "reason"),
-        (json!({"outcome": "converged"}), "gait_rmse_rad"),
-        (json!({"outcome": "converged", "gait_rmse_rad": -1}), "gait_rmse_rad"),
+        (json!({"label": "not_converged"}), "reason"),
+        (json!({"label": "converged"}), "gait_rmse_rad"),
+        (json!({"label": "converged", "gait_rmse_rad": -1}), "gait_rmse_rad"),
     ] {
         let refused = service.post(&tell, &body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
         assert_eq!(refused.json()["field"], field);
     }
-    let told = json!({"outcome": "not_converged", "reason": "the foot scuffed"});
+    let told = json!({"label": "not_converged", "reason": "the foot scuffed"});
     let told = service.post(&tell, &told).await.json();
     assert_eq!((&told["state"], &told["message"]), (&json!("not_converged"), &json!("the foot scuffed")));
     assert_eq!(
-        service.post(&tell, &json!({"outcome": "not_converged", "reason": "x"})).await.status,
+        service.post(&tell, &json!({"label": "not_converged", "reason": "x"})).await.status,
         StatusCode::CONFLICT
     );
     assert_ne!(service.post(&ask, &of("left")).await.json()["id"], left["id"]);
@@ -236,7 +236,7 @@ async fn people_compare_trials_of_a_lab_script() {
     for _ in 0..2 {
         let trial = service.post(&ask, &json!({})).await.json();
         let tell = format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap());
-        assert_eq!(service.post(&tell, &json!({"outcome": "converged"})).await.status, StatusCode::OK);
+        assert_eq!(service.post(&tell, &json!({"label": "converged"})).await.status, StatusCode::OK);
     }
     service.wait_for(study, &[StudyState::Waiting]).await;
     assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::CONFLICT, "first the answer");
@@ -264,8 +264,8 @@ async fn trial_without_convergence_counts_in_its_batch_and_is_not_compared() {
     for number in 1..=5 {
         let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
         let told = match number {
-            2 | 4 => json!({"outcome": "not_converged", "reason": "the foot scuffed"}),
-            _ => json!({"outcome": "converged", "gait_rmse_rad": 1.0 / f64::from(number)}),
+            2 | 4 => json!({"label": "not_converged", "reason": "the foot scuffed"}),
+            _ => json!({"label": "converged", "gait_rmse_rad": 1.0 / f64::from(number)}),
         };
         let tell = format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap());
         assert_eq!(service.post(&tell, &told).await.status, StatusCode::OK);

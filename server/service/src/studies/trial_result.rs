@@ -33,12 +33,13 @@ pub async fn ended(
     outcome: &SolveOutcome,
     gait: Option<&PackedGait>,
 ) -> Result<bool, Error> {
-    let Some(state) = trial_transitions::result_of(outcome.report.status) else {
+    let Some(label) = trial_transitions::label_of(outcome.report.status) else {
         return match outcome.report.status {
             SolveStatus::Cancelled => interrupted(store, lease).await,
             _ => broke(store, lease, "The solve ran out of time.").await,
         };
     };
+    let state = TrialState::from(label);
     let end = TrialEnd {
         state,
         report: Some(outcome.report.clone()),
@@ -68,7 +69,7 @@ pub async fn ended(
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;
         }
-        preference::compute(&mut writer, lease.study, (lease.trial, state), &answers, PROGRAM).await?;
+        preference::compute(&mut writer, lease.study, (lease.trial, label), &answers, PROGRAM).await?;
         tell(&mut writer, lease, state).await?;
         commit(writer).await?;
         return Ok(true);
