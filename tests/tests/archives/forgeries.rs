@@ -242,7 +242,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     ),
     (
         "an open job of a trial that ended",
-        |r| r.first("jobs")["state"] = "queued".into(),
+        |r| r.first("solve_jobs")["state"] = "queued".into(),
         "its state contradicts its job",
     ),
     (

@@ -1,7 +1,7 @@
 //! The state machine of a trial, as a pure function of what happens to its job.
 
 use gait_optimizer::SolveStatus;
-use gaitwright_store::jobs::FailureCounts;
+use gaitwright_store::solve_jobs::FailureCounts;
 use gaitwright_store::trials::{Label, TrialState};
 use thiserror::Error;
 

@@ -29,7 +29,9 @@ use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::workers::Track;
 use gaitwright_store::studies::{AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
-use gaitwright_store::{Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, jobs, studies, trials};
+use gaitwright_store::{
+    Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, solve_jobs, studies, trials,
+};
 use std::sync::Arc;
 
 /// The part that changes while the study runs.
@@ -230,7 +232,7 @@ pub(super) async fn read_live(
     let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
     live.walker = RecommendedGait::read(app, &live.study, best, &shown).await?;
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
-        live.queued = waits_for_a_worker(jobs::depth_of_others(&mut *app.read().await?, id).await?);
+        live.queued = waits_for_a_worker(solve_jobs::depth_of_others(&mut *app.read().await?, id).await?);
     }
     Ok(live)
 }

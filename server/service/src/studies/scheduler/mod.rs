@@ -3,11 +3,11 @@
 //! One task plans and dispatches jobs, one receives the messages of workers, one prefetches solves for studies that
 //! wait for an answer. Their decisions depend on the record alone, so the process may end at any instant.
 
-mod job_dispatch;
 mod leases;
 mod message_loop;
 mod planning_loop;
 mod prefetch_loop;
+mod solve_dispatch;
 
 use super::analysis::Analyses;
 use super::execution::{NewExecutionReport, Simulation};

@@ -4,7 +4,7 @@ use super::super::prefetch::LikelyNext;
 use super::super::snapshot::StudySnapshot;
 use super::super::solve_input::PackedInput;
 use super::Scheduler;
-use super::job_dispatch::assigned;
+use super::solve_dispatch::assigned;
 use crate::error::Error;
 use crate::supervise::Task;
 use crate::workers::Attempt;
