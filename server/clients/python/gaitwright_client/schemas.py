@@ -3473,10 +3473,12 @@ class UnblindedPair(_UnblindedPairRequired, total=False):
 
 
 class UnblindedRater(TypedDict):
-    """Pairs of an unblinded rater."""
+    """Unblinded rater."""
 
-    # All pairs of the rater, in order.
-    pairs: list[UnblindedPair]
+    # Name of the rater.
+    rater: str
+    # Identifier of the study.
+    study_id: StudyId
 
 
 class _UnchangedBoundRequired(TypedDict):
