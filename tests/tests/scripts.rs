@@ -198,7 +198,22 @@ async fn finished_study_is_extended_cloned_and_compared() {
     assert_eq!((&first["items"][0], &service.fetch(&next).await.items()[0]), (&both[0], &both[1]));
     assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
     assert!(both[0]["best_gait_rmse_rad"].is_f64());
-    for ids in [study.to_string(), format!("{study},{study}")] {
+    let mut six = vec![study, cloned];
+    for _ in 0..4 {
+        six.push(service.study(|new| new.start = false).await);
+    }
+    let of_six = six.iter().map(StudyId::to_string).collect::<Vec<_>>().join(",");
+    let (mut found, mut cursor) = (Vec::new(), String::new());
+    for expected in [5, 1] {
+        let path = format!("/api/v1/study-comparison?ids={of_six}&limit=1000{cursor}");
+        let page = service.fetch(&path).await.json();
+        let rows = page["items"].as_array().unwrap();
+        assert_eq!(rows.len(), expected, "a page has five studies at most, whatever its limit");
+        found.extend(rows.iter().map(|row| row["id"].clone()));
+        cursor = page["next"].as_str().map_or_else(String::new, |next| format!("&cursor={next}"));
+    }
+    assert_eq!((json!(found), cursor.as_str()), (json!(six), ""));
+    for ids in [study.to_string(), format!("{study},{study}"), vec![study.to_string(); 21].join(",")] {
         let refused = service.fetch(&format!("/api/v1/study-comparison?ids={ids}")).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{ids}");
         assert_eq!(refused.json()["field"], "ids");
