@@ -90,7 +90,7 @@ pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
     sqlx::query(
         "with recursive n(i) as (select 1 union all select i + 1 from n where i < ?1)
          insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
-         select printf('01890003-0000-7000-8000-%012d', i), a.study_id, 'preference', a.id, b.id, 'clinician', 'x', a.created_at
+         select printf('01890003-0000-7000-8000-%012d', i + (select max(seq) from feedback)), a.study_id, 'preference', a.id, b.id, 'clinician', 'x', a.created_at
          from n join trials a on a.study_id = ?2 and a.number = 1 join trials b on b.study_id = ?2 and b.number = 2",
     )
     .bind(answers)
