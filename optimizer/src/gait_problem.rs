@@ -7,12 +7,13 @@
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
-//! | C8 fibre kinematics | [`muscle_fibres`] |
+//! | C8 fibre kinematics | [`fibre_integration`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
 
 pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;
+pub mod fibre_integration;
 pub mod foot_clearance;
 mod gait_of_variables;
 mod hermite_simpson;
@@ -22,7 +23,6 @@ pub mod layout;
 pub mod margins;
 pub mod mechanics;
 pub mod mesh_transfer;
-pub mod muscle_fibres;
 pub mod muscle_forces;
 pub mod objective;
 mod problem_definition;

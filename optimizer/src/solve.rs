@@ -5,8 +5,11 @@ use crate::model_error::ModelError;
 use std::time::Instant;
 
 mod attempts;
+mod cold_start_guesses;
 mod error;
 mod gait_results;
+mod local_optima;
+mod local_optimum_choice;
 mod multi_start;
 mod options;
 mod phases;
@@ -17,13 +20,14 @@ mod solver_settings;
 mod warm_start;
 
 pub use crate::cancel_token::CancelToken;
-use attempts::{
-    FinishedAttempt, choose, enforce_between_nodes, number_local_optima, try_guesses, try_multi_start, try_warm,
-};
+use attempts::{FinishedAttempt, enforce_between_nodes, try_warm};
+pub use cold_start_guesses::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use error::SolveError;
 pub use gait_results::GaitResults;
-pub use multi_start::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
-pub use options::{LocalOptimumChoice, SolveOptions};
+use local_optima::{choose, number_local_optima};
+pub use local_optimum_choice::LocalOptimumChoice;
+use multi_start::{try_guesses, try_multi_start};
+pub use options::SolveOptions;
 use phases::SolveContext;
 pub(crate) use phases::final_settings;
 pub use progress::{IterationRecord, SolvePhase};

@@ -5,7 +5,7 @@ use super::elimination_tree::elimination_tree;
 use super::program_data::{GaitProgram, Structure};
 use super::sparse_entries::{Compressed, Entries};
 use super::{
-    contact_limits, hip_velocity, mechanics, muscle_fibres, muscle_forces, objective, stride, transitions,
+    contact_limits, fibre_integration, hip_velocity, mechanics, muscle_forces, objective, stride, transitions,
     virtual_constraint_rows, zero_dynamics,
 };
 use crate::body::PointState;
@@ -86,7 +86,7 @@ impl GaitProgram {
             }
             let context = self.domain_context(x, d);
             zero_dynamics::jacobian(self, &context, rows, x, out);
-            muscle_fibres::jacobian(self, &context, rows, x, out);
+            fibre_integration::jacobian(self, &context, rows, x, out);
             transitions::jacobian(self, d, rows, x, out);
         }
         stride::jacobian(self, x, out);
@@ -109,7 +109,7 @@ impl GaitProgram {
             }
             let context = self.domain_context(x, d);
             zero_dynamics::hessian(&context, rows, multipliers, out);
-            muscle_fibres::hessian(&context, rows, multipliers, out);
+            fibre_integration::hessian(&context, rows, multipliers, out);
             transitions::hessian(self, d, rows, x, multipliers, out);
         }
         stride::hessian(self, x, multipliers, out);
@@ -188,7 +188,7 @@ impl NonlinearProgram for GaitProgram {
             }
             let context = self.domain_context(x, d);
             zero_dynamics::values(self, &context, rows, x, values);
-            muscle_fibres::values(self, &context, rows, x, values);
+            fibre_integration::values(self, &context, rows, x, values);
             transitions::values(self, d, rows, x, values);
         }
         stride::values(self, x, values);

@@ -1,9 +1,6 @@
-//! The attempts of a solve: a warm start, then initial guesses in parallel, the choice of an attempt, and tightened
-//! bounds between nodes.
+//! An attempt of a solve: a start with its result; warm starts, and solves with tightened bounds between nodes.
 
 use super::error::SolveError;
-use super::multi_start::InitialGuess;
-use super::options::LocalOptimumChoice;
 use super::phases::{AttemptRun, SolveContext};
 use super::progress::{IterationRecord, SolvePhase};
 use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
@@ -14,21 +11,15 @@ use crate::gait_problem::inter_node_check::inter_node_excess;
 use crate::gait_problem::margins::Margins;
 use crate::gait_rmse::gait_rmse;
 use interior_point::{NlpResult, NonlinearProgram};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
-
-/// Largest differences of objective and Gait RMSE within a local optimum, at the tolerance of a solve.
-const SAME_OBJECTIVE: f64 = 1e-4;
-const SAME_RMSE_RAD: f64 = 5e-3;
 
 /// A result with the quantities that decide the choice.
 pub(super) struct Candidate {
     pub(super) result: NlpResult,
     pub(super) gait: Gait,
     pub(super) status: SolveStatus,
-    objective: f64,
-    rmse: f64,
-    violation: f64,
+    pub(super) objective: f64,
+    pub(super) rmse: f64,
+    pub(super) violation: f64,
 }
 
 impl Candidate {
@@ -84,7 +75,7 @@ impl FinishedAttempt {
         matches!(self.candidate.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
 
-    fn new(
+    pub(super) fn new(
         context: &SolveContext<'_>,
         result: NlpResult,
         strategy: &str,
@@ -122,22 +113,6 @@ pub(super) fn try_warm(
     Ok(FinishedAttempt::new(context, result, strategy, margins, &run))
 }
 
-/// Numbers the local optima of the attempts. Attempts with the same objective and Gait RMSE share a local optimum.
-pub(super) fn number_local_optima(tried: &mut [FinishedAttempt]) {
-    let mut known: Vec<(f64, f64)> = Vec::new();
-    for attempt in tried.iter_mut().map(|t| &mut t.attempt).filter(|a| a.status == SolveStatus::Converged) {
-        let (objective, rmse) = (attempt.objective, attempt.gait_rmse_rad);
-        let same = |&(other, other_rmse): &(f64, f64)| {
-            (objective - other).abs() <= SAME_OBJECTIVE * other.abs() && (rmse - other_rmse).abs() <= SAME_RMSE_RAD
-        };
-        let number = known.iter().position(same).unwrap_or_else(|| {
-            known.push((objective, rmse));
-            known.len() - 1
-        });
-        attempt.local_optimum = Some(number + 1);
-    }
-}
-
 /// Tightens the bounds that the chosen gait violates between its nodes and continues the solve, until there is no
 /// violation or the rounds are used up. Returns the index of the last converged attempt, or of a cancelled one.
 pub(super) fn enforce_between_nodes(
@@ -172,122 +147,4 @@ pub(super) fn enforce_between_nodes(
         chosen = tried.len() - 1;
     }
     Ok(chosen)
-}
-
-fn try_guess(
-    context: &SolveContext<'_>,
-    index: usize,
-    guess: &InitialGuess,
-    threads: usize,
-    observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<FinishedAttempt, SolveError> {
-    let mut run = AttemptRun::new(context, threads, observer);
-    run.guess = index;
-    let result = run.cold(guess)?;
-    Ok(FinishedAttempt::new(context, result, &guess.label(), Margins::default(), &run))
-}
-
-/// Messages from the threads of the attempts to the calling thread.
-#[allow(clippy::large_enum_variant)] // A few messages per solve, each moved once.
-enum Message {
-    Iteration(IterationRecord),
-    Done(usize, Result<FinishedAttempt, SolveError>),
-}
-
-/// Tries all guesses, as many in parallel as there are threads. The results have the order of the guesses, the first
-/// of which has the number `first`, and do not depend on the number of threads.
-pub(super) fn try_guesses(
-    context: &SolveContext<'_>,
-    guesses: &[InitialGuess],
-    first: usize,
-    observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Vec<FinishedAttempt>, SolveError> {
-    let threads = context.options.threads;
-    let workers = threads.min(guesses.len());
-    if workers <= 1 {
-        return (first..).zip(guesses).map(|(i, guess)| try_guess(context, i, guess, threads, observer)).collect();
-    }
-    let next = AtomicUsize::new(0);
-    let mut done: Vec<Option<Result<FinishedAttempt, SolveError>>> = guesses.iter().map(|_| None).collect();
-    std::thread::scope(|scope| {
-        let (sender, receiver) = mpsc::channel();
-        for _ in 0..workers {
-            let (sender, next) = (sender.clone(), &next);
-            scope.spawn(move || {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(guess) = guesses.get(index) else { break };
-                    let mut tell = |record: &IterationRecord| {
-                        // The receiver is gone only if the calling thread panics.
-                        let _ = sender.send(Message::Iteration(*record));
-                    };
-                    let tried = try_guess(context, first + index, guess, threads / workers, &mut tell);
-                    let _ = sender.send(Message::Done(index, tried));
-                }
-            });
-        }
-        drop(sender);
-        for message in receiver {
-            match message {
-                Message::Iteration(record) => observer(&record),
-                Message::Done(index, tried) => done[index] = Some(tried),
-            }
-        }
-    });
-    done.into_iter().flatten().collect()
-}
-
-/// Number of attempts at a stationary point of the violation after which no further guess is tried. With feasible
-/// bounds, so many guesses rarely end there.
-const MOST_INFEASIBLE: usize = 3;
-
-/// Tries the requested guesses in parallel, then further guesses until one converges.
-pub(super) fn try_multi_start(
-    context: &SolveContext<'_>,
-    observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Vec<FinishedAttempt>, SolveError> {
-    let muscles = context.problem.muscles;
-    let asked_for = context.options.initial_guesses;
-    let guesses = InitialGuess::first(asked_for.max(InitialGuess::MULTI_START.len()), muscles);
-    let (first, others) = guesses.split_at(asked_for);
-    let mut tried = try_guesses(context, first, 0, observer)?;
-    for guess in others.iter().filter(|guess| context.options.retry && InitialGuess::MULTI_START.contains(guess)) {
-        let infeasible = tried.iter().filter(|t| t.candidate.status == SolveStatus::Infeasible).count();
-        if tried.iter().any(FinishedAttempt::is_final) || infeasible >= MOST_INFEASIBLE {
-            break;
-        }
-        tried.extend(try_guesses(context, std::slice::from_ref(guess), tried.len(), observer)?);
-    }
-    Ok(tried)
-}
-
-/// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the
-/// smallest violation. Among the latter, stationary points of the violation come first, because they show which
-/// constraints conflict.
-pub(super) fn choose(tried: &[FinishedAttempt], choice: LocalOptimumChoice) -> usize {
-    if let Some(cancelled) = tried.iter().position(|t| t.candidate.status == SolveStatus::Cancelled) {
-        return cancelled;
-    }
-    let converged = || tried.iter().enumerate().filter(|(_, t)| t.candidate.status == SolveStatus::Converged);
-    let least = |key: &dyn Fn(&Candidate) -> f64, limit: f64| {
-        converged()
-            .filter(|(_, t)| t.candidate.objective <= limit)
-            .min_by(|a, b| key(&a.1.candidate).total_cmp(&key(&b.1.candidate)))
-            .map(|(index, t)| (index, t.candidate.objective))
-    };
-    let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
-        let gave_up = |t: &FinishedAttempt| t.candidate.status != SolveStatus::Infeasible;
-        let violation = |t: &FinishedAttempt| t.candidate.violation;
-        return tried
-            .iter()
-            .enumerate()
-            .min_by(|(_, a), (_, b)| gave_up(a).cmp(&gave_up(b)).then(violation(a).total_cmp(&violation(b))))
-            .map_or(0, |(index, _)| index);
-    };
-    match choice {
-        LocalOptimumChoice::LowestObjective => lowest,
-        LocalOptimumChoice::NearestToReference { within_percent } => {
-            least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
-        }
-    }
 }

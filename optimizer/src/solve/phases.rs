@@ -1,7 +1,7 @@
 //! An attempt in progress: its phases and their cost.
 
+use super::cold_start_guesses::{InitialGuess, MuscleRoute};
 use super::error::SolveError;
-use super::multi_start::{InitialGuess, MuscleRoute};
 use super::options::SolveOptions;
 use super::progress::{IterationRecord, SolvePhase};
 use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra};

@@ -36,6 +36,7 @@ mod suggestions;
 mod tokens;
 mod trials;
 mod users;
+mod walk_controller_files;
 
 use super::AppState;
 use utoipa_axum::router::OpenApiRouter;
@@ -118,7 +119,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         // in the lab
         .routes(routes!(lab_sessions::of_study, lab_sessions::create))
         .routes(routes!(lab_sessions::get))
-        .routes(routes!(lab_sessions::controller))
+        .routes(routes!(walk_controller_files::controller))
         .routes(routes!(lab_sessions::close))
         .routes(routes!(lab_sessions::unblind))
         .routes(routes!(measurement_files::list))

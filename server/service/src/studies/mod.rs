@@ -37,7 +37,6 @@ pub mod pair_answer;
 pub mod pending_comparison;
 mod planning_tasks;
 pub mod preference;
-mod prefetch;
 pub mod pruning;
 pub mod ranking;
 pub mod reference_import;

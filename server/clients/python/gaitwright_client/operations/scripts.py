@@ -54,7 +54,7 @@ class ScriptsMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[TellRequest],
     ) -> Trial:
-        """Tell the result of a trial.
+        """Tell the service the result of a trial.
 
         That there is no gait is also a result. If the script fails, cancel the trial instead.
 

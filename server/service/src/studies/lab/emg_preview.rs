@@ -1,7 +1,8 @@
 //! A preview of an EMG recording before it is stored: its columns, the raw channels, and the strides that its heel strikes
 //! give.
 
-use super::upload::{NewEmg, WHAT};
+use super::file_format::WHAT;
+use super::upload::NewEmg;
 use crate::error::Error;
 use gait_optimizer::emg::{CHANNELS, is_plausible, strides_between};
 

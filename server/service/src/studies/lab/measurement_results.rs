@@ -1,9 +1,11 @@
 //! Results of lab measurements: muscle activity over the gait cycle and limit cycles, with the model's values for
 //! unblinded walks.
 
+use super::emg_reading::EmgReading;
+use super::file_format::WHAT;
 use super::session::still_shown;
 use super::session_view::gait_of;
-use super::upload::{EmgReading, JointAngleReading, WHAT};
+use super::upload::JointAngleReading;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};

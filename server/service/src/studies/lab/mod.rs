@@ -6,6 +6,8 @@
 //! numbers, and the answer reaches the learner at unblinding.
 
 mod emg_preview;
+mod emg_reading;
+mod file_format;
 mod lab_answer;
 mod measurement_results;
 mod question;
@@ -13,9 +15,12 @@ mod session;
 mod session_view;
 mod unblinding;
 mod upload;
+mod walk_controller_file;
 
 pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
+pub use emg_reading::EmgReading;
+pub use file_format::MeasurementFormat;
 pub use lab_answer::{NewAnswer, give as answer, retract};
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
@@ -23,12 +28,12 @@ pub use measurement_results::{
 };
 pub use question::{AnswerView, WALKS};
 pub use session::{
-    GaitOfWalk, LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, for_device, gaits_to_plan_with,
-    gaits_to_walk_with, plan, record_walk, session_progress, still_open, was_recorded,
+    LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, gaits_to_plan_with, gaits_to_walk_with, plan,
+    record_walk, session_progress, still_open, was_recorded,
 };
 pub use session_view::{LabSessionState, LabSessionView, WalkCondition, WalkView};
 pub use unblinding::unblind;
 pub use upload::{
-    CheckedFile, EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles, UploadedFile, check_kept,
-    read_upload, store_upload,
+    CheckedFile, JointAngleReading, NewEmg, NewJointAngles, UploadedFile, check_kept, read_upload, store_upload,
 };
+pub use walk_controller_file::{GaitOfWalk, for_device};

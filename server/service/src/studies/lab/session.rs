@@ -1,7 +1,6 @@
 //! Lab sessions: planning, controller files, recording of walks, closing.
 
 use super::question::{AnswerView, WALKS, can_be_retracted, next_walk, requested_answer, takes_report};
-use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::same_motion::is_same_gait;
@@ -33,52 +32,15 @@ pub struct NewLabSession {
     pub notes: String,
 }
 
-/// Which of a session's two gaits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GaitOfWalk {
-    /// Gait A.
-    A,
-    /// Gait B.
-    B,
-}
-
-/// Releases the controller file of a walk and records who fetched it, because the file reveals the gait. Only the
-/// device's token leaves the session blinded for its caller. Both gaits are admitted in the transaction of the release,
-/// so no file is released after a report was acknowledged.
-///
-/// # Errors
-/// [`Error::Invalid`] for a walk without the device or an unknown walk, [`Error::Conflict`] if the session is closed, one
-/// of its gaits is not walkable, the allocation is not in this record, or the subject withdrew consent.
-pub async fn for_device(writer: &mut Writer, caller: &Caller, id: LabSessionId, walk: u8) -> Result<GaitOfWalk, Error> {
-    let session = still_shown(writer, id).await?;
-    checked_device_walk(walk)?;
-    if !session.allocation.included {
-        return Err(not_included());
-    }
-    gaits_to_walk_with(writer, &session, walk).await?;
-    let to_device = caller.is_device();
-    let is_one = allocations::for_device(writer, id, walk, (&caller.actor, to_device)).await?;
-    let detail = json!({ "walk": walk, "to_device": to_device });
-    audit::append(writer, &caller.actor, "lab_session.controller_file", &format!("lab session {id}"), &detail).await?;
-    Ok(if is_one.ok_or_else(not_included)? { GaitOfWalk::A } else { GaitOfWalk::B })
-}
-
 /// Checks that a number is that of a walk with the device.
 ///
 /// # Errors
 /// [`Error::Invalid`].
-fn checked_device_walk(walk: u8) -> Result<u8, Error> {
+pub(super) fn checked_device_walk(walk: u8) -> Result<u8, Error> {
     match checked_walk(walk)? {
         1 => Err(Error::invalid("walk", walk, "2 or 3, because walk 1 is without the device")),
         with_device => Ok(with_device),
     }
-}
-
-pub(super) fn not_included() -> Error {
-    Error::conflict(
-        "The archive of this session did not include the allocation, because the session was blinded. Unblind it on the \
-         system where it was planned.",
-    )
 }
 
 /// The walkable gaits of a study, each motion once, among the `limit` converged trials of lowest Gait RMSE, lowest first.

@@ -1,7 +1,8 @@
 //! Unblinding of a lab session.
 
 use super::lab_answer;
-use super::session::{not_included, still_shown};
+use super::session::still_shown;
+use super::walk_controller_file::not_included;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};

@@ -6,14 +6,15 @@
 mod leases;
 mod message_loop;
 mod planning_loop;
-mod prefetch_loop;
+mod prefetch;
+mod prefetched_solves;
 mod solve_dispatch;
 
+use self::prefetched_solves::Prefetches;
 use super::analysis::Analyses;
 use super::execution::{NewExecutionReport, Simulation};
 use super::explanation::ExplanationEffort;
 use super::jobs_after_solves::JobsAfterSolves;
-use super::prefetch::Prefetches;
 use super::snapshot::StudySnapshot;
 use crate::error::Error;
 use crate::job::{JobId, JobState};

@@ -1,9 +1,9 @@
 //! Dispatch of solve jobs: leases a queued job and submits its solve to the engine.
 
-use super::super::prefetch::{PREPARED, Prepared};
 use super::super::solve_input::{PackedInput, SolveInput};
 use super::super::trial_result;
 use super::Scheduler;
+use super::prefetched_solves::{PREPARED, Prepared};
 use crate::dispatch_error::DispatchError;
 use crate::error::Error;
 use crate::workers::{Assignment, Attempt};

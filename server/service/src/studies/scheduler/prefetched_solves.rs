@@ -1,10 +1,10 @@
-//! Prefetched solves: while a person decides, idle workers solve the trials that may follow.
+//! Prefetched solves: what idle workers solve ahead is kept here until a trial claims it.
 //!
 //! The same problem from the same start has the same solution, bit for bit, so a prefetched solution only shortens the
 //! wait. The record and the learner see it only when a trial claims it.
 
-use super::next_step::likely_next;
-use super::snapshot::StudySnapshot;
+use super::super::next_step::likely_next;
+use super::super::snapshot::StudySnapshot;
 use crate::error::Error;
 use crate::workers::{Assignment, AssignmentResult, Attempt, EngineMessage, Receipt};
 use gaitwright_store::feedback::LogVersion;

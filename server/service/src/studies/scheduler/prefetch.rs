@@ -1,9 +1,9 @@
 //! The prefetch loop: while studies wait for an answer, idle workers solve the trials that may follow.
 
-use super::super::prefetch::LikelyNext;
 use super::super::snapshot::StudySnapshot;
 use super::super::solve_input::PackedInput;
 use super::Scheduler;
+use super::prefetched_solves::LikelyNext;
 use super::solve_dispatch::assigned;
 use crate::error::Error;
 use crate::supervise::Task;
