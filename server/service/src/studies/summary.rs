@@ -5,7 +5,7 @@ use super::equal_actions::never_active;
 use super::snapshot::StudySnapshot;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::{Label, Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Serialize;
 
@@ -45,8 +45,8 @@ pub struct TrialSummary {
     pub trial_id: TrialId,
     /// Bounds of the trial.
     pub action: TunedBounds,
-    /// `converged` or `not_converged`. Absent without a result.
-    pub label: Option<TrialState>,
+    /// Label. Absent without a result.
+    pub label: Option<Label>,
     /// State of the trial.
     pub state: TrialState,
     /// Status of the solve.
@@ -91,7 +91,7 @@ fn line(trial: &Trial, all: &[Trial]) -> TrialSummary {
         number: trial.number,
         trial_id: trial.id,
         action: trial.action,
-        label: Some(trial.state).filter(|state| state.is_result()),
+        label: trial.state.label(),
         state: trial.state,
         status: trial.status,
         gait_rmse_rad: trial.gait_rmse_rad,
