@@ -108,7 +108,7 @@ fn rectified_signals_and_envelopes_are_rejected() {
         let reason = checked(envelope).unwrap_err();
         println!("{name}: {reason}");
         assert!(
-            reason.contains("% of the signal (RMS) is within 20 to 450 Hz, less than 10 %. It looks like an envelope"),
+            reason.contains("% of the signal (RMS) is between 20 and 450 Hz; a raw signal has at least 10 %. This looks like an envelope"),
             "{reason}"
         );
     }

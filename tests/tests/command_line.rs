@@ -82,7 +82,7 @@ fn other_invalid_arguments_are_refused() {
     refused(&["solve", "--tolerance", "5"], "--tolerance is 5; it must be 1e-10 to 0.01.");
     refused(
         &["solve", "--reference", "foo"],
-        "There is no reference gait foo: give falisse-2019, fukuchi-2018 or a file. (No such file or directory)",
+        "There is no reference gait foo. Give the name of a built-in one (falisse-2019, fukuchi-2018) or an existing file.",
     );
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
@@ -169,9 +169,9 @@ fn file_other_than_a_database_is_refused_by_name_and_unchanged() {
     for command in [&["tune"][..], &["serve", "--listen", "127.0.0.1:0"], &["audit", "verify"], &["backup", "copy.db"]]
     {
         let with = |file| [command, &["--database", file]].concat();
-        refused_beside(&["notes.txt"], &with("notes.txt"), "notes.txt is not a gaitwright database");
+        refused_beside(&["notes.txt"], &with("notes.txt"), "notes.txt is not a Gaitwright database");
     }
-    refused_beside(&[], &["tune", "--database", "folder"], "folder is not a gaitwright database: it is a folder");
+    refused_beside(&[], &["tune", "--database", "folder"], "folder is not a Gaitwright database: it is a folder");
     refused_beside(&[], &["tune", "--database", "nowhere/a.db"], "Cannot open the database nowhere/a.db");
     // Only the first bytes are valid.
     let folder = tempfile::tempdir().unwrap();
@@ -181,7 +181,7 @@ fn file_other_than_a_database_is_refused_by_name_and_unchanged() {
     let output = gaitwright(folder.path(), &["tune", "--database", "a.db"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("a.db is not a gaitwright database"), "{text}");
+    assert!(text.contains("a.db is not a Gaitwright database"), "{text}");
     assert_eq!(cli::files(folder.path()), ["a.db"]);
 }
 

@@ -39,7 +39,7 @@ async fn database_of_another_program_is_refused_and_unchanged() {
             let text = String::from_utf8_lossy(&output.stderr);
             assert_eq!(output.status.code(), Some(2), "{command:?}: {text}");
             assert!(
-                text.contains("other.db is not a gaitwright database") && text.contains(why),
+                text.contains("other.db is not a Gaitwright database") && text.contains(why),
                 "{command:?}: {text}"
             );
             assert_eq!(std::fs::read(&file).unwrap(), bytes, "{command:?}");

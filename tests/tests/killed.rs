@@ -206,5 +206,5 @@ fn second_process_is_refused_while_the_first_owns_the_record() {
         .unwrap();
     assert!(!second.status.success());
     let text = String::from_utf8_lossy(&second.stderr);
-    assert!(text.contains("in use by another gaitwright process"), "{text}");
+    assert!(text.contains("in use by another Gaitwright process"), "{text}");
 }

@@ -218,7 +218,7 @@ async fn second_report_of_a_session_is_also_recorded() {
         assert_eq!(closed(&service, lab.study).await, names(&lab.gaits), "{again}");
     }
     let reports = service.fetch(&format!("/api/v1/studies/{}/safety-reports", lab.study)).await.items().to_string();
-    assert!(reports.contains("the subject in lab session 1 (walk 3; blinded, may be either gait)"), "{reports}");
+    assert!(reports.contains("the subject in lab session 1 (walk 3; blinded: it may be either gait)"), "{reports}");
     service.stop().await;
 }
 

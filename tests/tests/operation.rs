@@ -194,7 +194,7 @@ async fn restore_keeps_the_present_record_beside_the_backup() {
     let (done, text) = gaitwright(folder.path(), &["backup", "copy.db"]);
     assert!(done, "{text}");
     let (done, text) = gaitwright(folder.path(), &["restore", "copy.db"]);
-    assert!(!done && text.contains("in use by another gaitwright process"), "{text}");
+    assert!(!done && text.contains("in use by another Gaitwright process"), "{text}");
     let later = service.study(|new| new.number_of_trials = 1).await;
     service.wait_for(later, &[StudyState::Finished]).await;
     service.stop().await;

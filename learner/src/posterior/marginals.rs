@@ -117,7 +117,7 @@ impl Posterior {
         if row_dimension == column_dimension {
             return Err(LearnerError::InvalidDimension {
                 dimension: self.dimension(row_dimension)?.name.clone(),
-                reason: "it is given as rows and as columns; a slice needs two different dimensions".into(),
+                reason: "it is given for both rows and columns; a slice needs two different dimensions".into(),
             });
         }
         let mut levels = self.space().levels(through);

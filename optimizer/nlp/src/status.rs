@@ -188,7 +188,7 @@ pub enum NlpError {
         high: f64,
     },
     /// A setting needs a feature that this build lacks.
-    #[error("setting {field} is {value}, for which this program was built without the feature {feature}")]
+    #[error("setting {field} is {value}, which needs the feature {feature}, but this program was built without it")]
     NotBuiltIn {
         /// Name of the field.
         field: &'static str,

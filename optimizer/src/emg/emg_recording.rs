@@ -36,7 +36,8 @@ impl EmgRecording {
         if rate_hz.is_some()
             && let Some(time) = table.names().iter().find(|name| name.to_ascii_lowercase().starts_with("time"))
         {
-            let reason = format!("the file has a time column, {time:?}; a sampling rate is for files without one");
+            let reason =
+                format!("the file has a time column, {time:?}; give a sampling rate only for a file without one");
             return Err(table.malformed_names(reason));
         }
         Self::from_table(&table)

@@ -47,7 +47,7 @@ impl EmgRecording {
         let time_s = self.start_s + place as f64 / self.rate_hz;
         Some(format!(
             "the sample {} at {time_s:.4} s is an artefact: it is more than {FARTHEST_SAMPLE} times as far from the median as 99 % of \
-             the samples ({kept_within:.3e})",
+             the samples, which lie within {kept_within:.3e} of it",
             samples[place]
         ))
     }
@@ -69,8 +69,8 @@ impl EmgRecording {
         let share = rms(&signal_filter::filter(&band, &about_mean)) / rms(&about_mean);
         (share < LEAST_IN_BAND).then(|| {
             format!(
-                "{:.1} % of the signal (RMS) is within {band_low_hz} to {band_high_hz} Hz, less than {:.0} %. It looks \
-                 like an envelope or a movement artefact; upload the raw signal",
+                "only {:.1} % of the signal (RMS) is between {band_low_hz} and {band_high_hz} Hz; a raw signal has at least \
+                 {:.0} %. This looks like an envelope or a movement artefact; upload the raw signal",
                 100.0 * share,
                 100.0 * LEAST_IN_BAND
             )
@@ -87,7 +87,7 @@ fn rectified(samples: &[f64]) -> Option<String> {
     let share = samples.iter().filter(|sample| **sample <= near).count() as f64 / samples.len() as f64;
     (share >= OFTEN).then(|| {
         format!(
-            "the signal is never negative and often near zero ({:.0} of 100 samples). It looks rectified, but the raw signal \
+            "the signal is never negative and often near zero ({:.0} % of the samples). It looks rectified, but the raw signal \
              is needed",
             100.0 * share
         )

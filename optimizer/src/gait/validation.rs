@@ -86,7 +86,12 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
     lengths.extend(trajectory.contact_forces.iter().map(|f| ("contact_forces", f.len(), contacts.len())));
     lengths.extend(trajectory.bezier.iter().map(|row| ("bezier", row.len(), BEZIER_COEFFICIENTS)));
     if muscles != trajectory.muscles.is_some() {
-        return Err("muscles are present in some domains only, or do not match with_muscles".to_owned());
+        let reason = if muscles {
+            "muscle states are missing, although `muscles` is true"
+        } else {
+            "muscle states are present, although `muscles` is false"
+        };
+        return Err(reason.to_owned());
     }
     if let Some(states) = &trajectory.muscles {
         lengths.push(("fibre_length", states.fibre_length.len(), points));
@@ -99,7 +104,9 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
     let impulses = trajectory.impulse.as_ref().map(Vec::len);
     let expected = domain.opens_with_impact().then_some(contacts.len());
     if impulses != expected {
-        return Err(format!("impulse has {impulses:?} entries, expected {expected:?}"));
+        let found = impulses.map_or_else(|| "is absent".to_owned(), |count| format!("has {count} entries"));
+        let wanted = expected.map_or_else(|| "none".to_owned(), |count| count.to_string());
+        return Err(format!("impulse {found}, expected {wanted}"));
     }
     let forward = trajectory.phase_end_m > trajectory.phase_start_m;
     if !(forward && trajectory.duration_s > 0.0 && trajectory.duration_s.is_finite()) {

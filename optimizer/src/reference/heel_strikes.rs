@@ -113,7 +113,7 @@ impl MotionRecording {
             let hint = match how {
                 HeelStrikes::Kinematics => {
                     "; if the recording is exactly one stride, such as an exported gait, use its first and last rows as heel \
-                     strikes (ends)"
+                     strikes"
                 }
                 _ => "",
             };

@@ -33,8 +33,8 @@ fn not_from_right_heel_strike(mean: &[[f64; 5]]) -> Option<String> {
     (highest(second) > highest(first) + STANCE_FLEXION_RAD).then(|| {
         let (first, second) = (highest(first).to_degrees(), highest(second).to_degrees());
         format!(
-            "the left leg swings in the first half of the stride from right heel strike, but the left knee bends to {first:.0}° \
-             there and to {second:.0}° in the second half; {cause}"
+            "the left leg should swing in the first half of the stride from right heel strike, but the left knee bends less in \
+             that half ({first:.0}°) than in the second half ({second:.0}°); {cause}"
         )
     })
 }

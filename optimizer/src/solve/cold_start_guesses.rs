@@ -280,7 +280,7 @@ impl InitialGuess {
             ("stride time ", self.stride_time_s, normal.stride_time_s, "s"),
             ("stride length ", self.stride_length_m, normal.stride_length_m, "m"),
             ("barrier ", self.barrier, normal.barrier, ""),
-            ("constraint curvature below a violation of ", self.curvature_from, normal.curvature_from, ""),
+            ("constraint curvature once the violation is below ", self.curvature_from, normal.curvature_from, ""),
         ] {
             if value == WHOLE_HESSIAN {
                 label.push_str(", exact Hessian from the start");
@@ -339,7 +339,7 @@ mod tests {
         assert_eq!(
             InitialGuess::perturbed(0).label(),
             "cold, direct, heel rise at 0.399 on the right, at 0.308 on the left, knee flexion × 0.743, stride time 1.079 s, \
-             stride length 1.061 m, constraint curvature below a violation of 0.043"
+             stride length 1.061 m, constraint curvature once the violation is below 0.043"
         );
     }
 }

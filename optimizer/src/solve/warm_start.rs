@@ -78,7 +78,7 @@ pub(crate) fn check_shape(program: &GaitProgram, warm: &WarmStart) -> Result<(),
     }
     if !warm.margins.fit(n, m) {
         return Err(SolveError::WarmStartShape(
-            "its margins must be non-negative and belong to its variables and rows".to_owned(),
+            "its margins are negative, or do not match its variables and rows".to_owned(),
         ));
     }
     Ok(())

@@ -72,7 +72,7 @@ impl Parallel {
         if self.lines.iter().any(|line| line.outcome.is_some()) {
             legend.push((
                 "key c0 solid".to_owned(),
-                "trial with a gait: the better the gait, the stronger the line".to_owned(),
+                "trial with a gait: the fainter the line, the worse the gait".to_owned(),
             ));
         }
         if self.lines.iter().any(|line| line.outcome.is_none()) {

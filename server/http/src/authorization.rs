@@ -53,7 +53,7 @@ pub(crate) fn permitted<P: RequiredRight>(extensions: &Extensions) -> Result<Cal
     let caller = extensions.get::<Caller>().ok_or_else(not_signed_in)?;
     match P::NEEDED {
         Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
-            "This needs the right `{}`, which you do not have. Ask an administrator.",
+            "This request requires the right `{}`, which you do not have. Ask an administrator for it.",
             needed.as_str()
         ))),
         _ => Ok(caller.clone()),

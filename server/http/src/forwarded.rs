@@ -138,7 +138,9 @@ fn unreadable(what: &str, value: &str) -> Error {
 fn parts(headers: &HeaderMap, name: &HeaderName) -> Result<Vec<String>, Error> {
     let mut parts = Vec::new();
     for line in headers.get_all(name) {
-        let text = line.to_str().map_err(|_| unreadable(name.as_str(), "not text"))?;
+        let text = line.to_str().map_err(|_| {
+            Error::Malformed(format!("A header of the reverse proxy is malformed: {name} is not printable ASCII."))
+        })?;
         let split = split(text, ',').ok_or_else(|| unreadable(name.as_str(), text))?;
         parts.extend(split.into_iter().map(|part| part.trim().to_owned()));
     }

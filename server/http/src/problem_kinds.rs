@@ -109,7 +109,7 @@ impl ProblemKind {
                 "/problems/forbidden",
                 StatusCode::FORBIDDEN,
                 "Not allowed",
-                "The caller lacks the required right, or the request comes from another site, names an unknown host, or came \
+                "The caller lacks the required right, or the request comes from another site, names an unknown host, or comes \
                  through a proxy to a service without sign-in.",
                 "Ask an administrator for the right. If the detail names a host, add it to the setting host_names.",
             ),

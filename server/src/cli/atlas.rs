@@ -24,7 +24,7 @@ pub(super) struct AtlasCommand {
     #[command(flatten)]
     multi_start: MultiStartFlags,
     /// Output file with one row for each action. Until it is complete, the solves so far are in FILE.csv.progress; if
-    /// the process is killed, the same command continues with them.
+    /// the process is killed, run the same command again to continue.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Number of solves that run in parallel (default: number of cores). The result does not depend on it.
@@ -62,7 +62,7 @@ impl AtlasCommand {
         out.finish()?;
         tell(&format!("{}; written to {path}", finished.map.in_words()));
         if let Err(e) = finished.forget_progress() {
-            tell(&format!("gaitwright: cannot remove the file of solves: {e}"));
+            tell(&format!("gaitwright: cannot remove the progress file: {e}"));
         }
         Ok(CommandEnd::Done)
     }

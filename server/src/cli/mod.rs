@@ -72,13 +72,13 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Run the service: web pages, REST interface and the studies in a database.
+    /// Run the service (web pages and REST interface) and the studies in its database.
     Serve(serve::ServeCommand),
     /// Run solves on this machine for a service on another machine, through a NATS broker.
     Worker(worker::WorkerCommand),
     /// Run an unattended study in which Gait RMSE, not a person, answers the comparisons.
     ///
-    /// If the record has an unfinished study with the same settings, continues it instead of creating another one.
+    /// If the record has an unfinished study with the same settings, continue it instead of creating another one.
     Tune(tune::TuneCommand),
     /// Reproduce the paper's comparison of gaits with and without muscles.
     Reproduce(reproduce::ReproduceCommand),
@@ -112,19 +112,19 @@ enum Command {
     Openapi,
     /// Back up a record, even while the service is running.
     Backup(backup::BackupCommand),
-    /// Replace a record with a backup, while the service is stopped.
+    /// Replace a record with a backup; the service must be stopped.
     ///
     /// The replaced record is kept in the same folder under another name.
     Restore(backup::RestoreCommand),
     /// Export a study to an archive, even while the service is running.
     Export(archive_commands::ExportCommand),
-    /// Import a study from an archive, while the service is stopped.
+    /// Import a study from an archive; the service must be stopped.
     Import(archive_commands::ImportCommand),
     /// Create a key for signing archives, and print its public key.
     SigningKey(archive_commands::SigningKeyCommand),
-    /// List users or create sign-in links for them, while the service is stopped.
+    /// List users or create sign-in links for them; the service must be stopped.
     Users(users::UsersCommand),
-    /// Delete old trajectories, while the service is stopped.
+    /// Delete old trajectories; the service must be stopped.
     ///
     /// Results, answers and recommended gaits are kept. Expired idempotency keys, sessions and sign-in links are deleted.
     Prune(prune::PruneCommand),

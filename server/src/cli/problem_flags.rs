@@ -89,7 +89,7 @@ pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> 
     {
         let names: Vec<&str> = ReferenceGait::all_builtin()?.into_iter().map(|(name, _)| name).collect();
         return Err(Error::Malformed(format!(
-            "There is no reference gait {}: give {} or a file. (No such file or directory)",
+            "There is no reference gait {}. Give the name of a built-in one ({}) or an existing file.",
             path.display(),
             names.join(", ")
         )));

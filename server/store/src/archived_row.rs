@@ -234,7 +234,11 @@ impl Visitor<'_> for NameVisitor {
     }
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Name, E> {
-        if text.len() > 100 { Err(E::custom("a name of more than 100 bytes")) } else { Ok(Name(text.to_owned())) }
+        if text.len() > 100 {
+            Err(E::custom("a column name has more than 100 bytes"))
+        } else {
+            Ok(Name(text.to_owned()))
+        }
     }
 }
 
@@ -257,9 +261,12 @@ impl Visitor<'_> for HexadecimalVisitor {
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Hexadecimal, E> {
         if text.len() > 2 * LARGEST_BLOB_BYTES {
-            return Err(E::custom(format!("{} bytes; at most {LARGEST_BLOB_BYTES}", text.len() / 2)));
+            return Err(E::custom(format!(
+                "a binary value has {} bytes, but at most {LARGEST_BLOB_BYTES} are allowed",
+                text.len() / 2
+            )));
         }
-        hex::decode(text).map(Hexadecimal).map_err(|_| E::custom("bytes that are not hexadecimal"))
+        hex::decode(text).map(Hexadecimal).map_err(|_| E::custom("a binary value is not hexadecimal"))
     }
 }
 
@@ -283,10 +290,10 @@ impl<'de> Deserialize<'de> for Row {
                 let mut cells = BTreeMap::new();
                 while let Some((Name(name), cell)) = map.next_entry::<Name, Cell>()? {
                     if cells.len() == MOST_COLUMNS {
-                        return Err(A::Error::custom(format!("more than {MOST_COLUMNS} columns")));
+                        return Err(A::Error::custom(format!("it has more than {MOST_COLUMNS} columns")));
                     }
                     if cells.contains_key(&name) {
-                        return Err(A::Error::custom(format!("column {name:?} twice")));
+                        return Err(A::Error::custom(format!("column {name:?} occurs twice")));
                     }
                     cells.insert(name, cell);
                 }
@@ -329,7 +336,7 @@ mod tests {
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
             (r#"{"a": 18446744073709551615}"#.to_owned(), "too large"),
             (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a string has"),
-            (format!(r#"{{"{}": 1}}"#, "x".repeat(101)), "a name of more than"),
+            (format!(r#"{{"{}": 1}}"#, "x".repeat(101)), "a column name has more than"),
             ("[".repeat(100_000), "invalid type"),
         ] {
             let refusal = serde_json::from_str::<Row>(&text).unwrap_err().to_string();

@@ -22,7 +22,7 @@ pub enum StoreError {
         source: std::io::Error,
     },
     /// The file is not a database of this program.
-    #[error("{} is not a gaitwright database: {reason}.", path.display())]
+    #[error("{} is not a Gaitwright database: {reason}.", path.display())]
     NotADatabase {
         /// The file.
         path: PathBuf,
@@ -30,7 +30,7 @@ pub enum StoreError {
         reason: String,
     },
     /// Another process owns the file.
-    #[error("The database {} is in use by another gaitwright process. Stop that process or choose another file.", path.display())]
+    #[error("The database {} is in use by another Gaitwright process. Stop that process or choose another file.", path.display())]
     InUse {
         /// The file.
         path: PathBuf,
@@ -48,7 +48,7 @@ pub enum StoreError {
     /// A newer version of the program wrote the file.
     #[error(
         "The database {} has schema version {found}, but this program supports versions up to {known}. Nothing was changed. Use \
-         a newer version of gaitwright.",
+         a newer version of Gaitwright.",
         path.display()
     )]
     NewerSchema {
@@ -61,7 +61,7 @@ pub enum StoreError {
     },
     /// A development version, with another migration of this number, wrote the file.
     #[error(
-        "The database {} is from a development version of gaitwright: its migration {version} differs from the one of this version, \
+        "The database {} is from a development version of Gaitwright: its migration {version} differs from that of this version, \
          so its tables cannot be read. Nothing was changed. Open it with the version that wrote it, or start an empty record \
          in another file.",
         path.display()

@@ -43,9 +43,5 @@ pub(super) fn check(path: &Path) -> StoreResult<()> {
     };
     let mut start = Vec::with_capacity(HEADER.len());
     file.take(HEADER.len() as u64).read_to_end(&mut start).map_err(cannot_open)?;
-    if start.is_empty() || start == HEADER {
-        Ok(())
-    } else {
-        no_database("it does not start with the header of SQLite")
-    }
+    if start.is_empty() || start == HEADER { Ok(()) } else { no_database("it does not start with the SQLite header") }
 }

@@ -72,7 +72,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     (
         "a violation that converges",
         |r| everywhere(r, "max_violation", 0.5),
-        "it is converged, but its violation is 0.5",
+        "its state is converged, but its violation is 0.5",
     ),
     (
         "parts of an RMSE",

@@ -66,7 +66,7 @@ async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusa
     Ok(before)
 }
 
-/// Tell the outcome of a trial
+/// Tell the service the outcome of a trial
 ///
 /// An outcome without a gait is also a result. If the script fails, cancel the trial instead.
 #[utoipa::path(

@@ -50,7 +50,7 @@ pub(super) struct NextBlindPair {
     operation_id = "draw_blind_pair",
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "Pair that was drawn earlier, or null if no comparison is pending", body = NextBlindPair), (status = 201, description = "New pair. `Location` is its first motion", body = NextBlindPair)),
+    responses((status = 200, description = "Pair that was drawn earlier, or null if no comparison is pending", body = NextBlindPair), (status = 201, description = "New pair. `Location` points to its first motion", body = NextBlindPair)),
     security(("token" = ["rate"]), ("session" = ["rate"])),
 )]
 pub(super) async fn next(
@@ -164,8 +164,8 @@ pub(super) async fn answer(
 
 /// List raters with their reliability
 ///
-/// Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
-/// Sorted by name.
+/// Agreement of raters with their own earlier answers, position bias of unblinded raters, and the number of answers
+/// that are not blind. Sorted by name.
 #[utoipa::path(
     get,
     path = "/studies/{id}/raters",

@@ -117,7 +117,7 @@ pub(super) async fn get(
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses(
         (status = 200, description = "Finished job for the existing, complete explanation", body = Job),
-        (status = 202, description = "Job that makes the explanation, which takes a few minutes and has lower priority than solves", body = Job)
+        (status = 202, description = "Job that computes the explanation. It takes a few minutes and has lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]

@@ -142,7 +142,7 @@ pub(super) struct LabSessionUnblinding {
 
 /// Unblind a lab session
 ///
-/// Reveals which gait each walk used to everyone who can access the study. The audit trail records the unblinding,
+/// Reveals to everyone who can access the study which gait each walk used. The audit trail records the unblinding,
 /// later walks are marked as recorded after it, and the answer of the subject becomes a preference of the study.
 #[utoipa::path(
     post,

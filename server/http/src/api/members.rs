@@ -188,7 +188,7 @@ pub(super) struct CreatedRaterInvitation {
     path: String,
 }
 
-/// Create an invitation of a rater
+/// Create an invitation for a rater
 ///
 /// Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
 #[utoipa::path(

@@ -91,7 +91,7 @@ pub(super) async fn get(
     Ok(Json(reference_gaits::get(&mut *app.read().await?, id).await?.into()))
 }
 
-/// List the nearest reference gaits of a subject
+/// List the reference gaits nearest to a subject
 ///
 /// Sorted by distance in height and body mass, the nearest first. Those without height and mass come last.
 #[utoipa::path(

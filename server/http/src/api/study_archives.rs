@@ -28,7 +28,7 @@ const CHUNK_BYTES: usize = 1 << 16;
 
 /// Download a study as an archive
 ///
-/// The archive has every row of the study, without concealed allocations, as `gaitwright export` writes it.
+/// The archive has every row of the study except concealed allocations, as `gaitwright export` writes it.
 #[utoipa::path(
     get,
     path = "/studies/{id}/archive",

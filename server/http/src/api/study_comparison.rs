@@ -66,7 +66,7 @@ pub(super) struct StudyComparison {
     solve_seconds: f64,
 }
 
-/// List compared studies
+/// List studies for comparison
 ///
 /// Properties and results of several studies. A page has at most 5 studies, because each needs a posterior. Sorted as in
 /// `ids`.

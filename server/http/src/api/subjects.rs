@@ -160,7 +160,7 @@ pub(super) async fn withdraw(
     Ok(answer)
 }
 
-/// List corrections of a subject
+/// List corrections of a subject's height and mass
 ///
 /// Corrections of height and mass, oldest first. The last entry applies.
 #[utoipa::path(
@@ -184,7 +184,7 @@ pub(super) async fn corrections(
     Ok(Json(paging.cut(all, |correction| correction.seq)?.map(Correction::from)))
 }
 
-/// Create a correction of a subject
+/// Create a correction of a subject's height and mass
 ///
 /// Corrects height and mass. New studies use the corrected values. Existing studies keep theirs.
 #[utoipa::path(

@@ -124,7 +124,7 @@ pub(super) struct SignInLink {
     operation_id = "create_sign_in_link",
     tag = "access",
     params(("id" = UserId, Path, description = "Identifier of the user")),
-    responses((status = 201, description = "Link, shown once. `Location` is its user, because a link is a secret", body = SignInLink)),
+    responses((status = 201, description = "Link, shown once. `Location` points to the user, because the link is a secret", body = SignInLink)),
     extensions(("x-shown-once" = json!(true))),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]

@@ -228,7 +228,7 @@ async fn account_of(
     headers: &HeaderMap,
 ) -> Result<(AccountPage, User, Actor), Error> {
     let caller = caller.ok_or_else(not_signed_in)?;
-    let id = caller.user.ok_or_else(|| Error::conflict("No user is signed in, so there is no account."))?;
+    let id = caller.user.ok_or_else(|| Error::conflict("Only a signed-in user has an account."))?;
     let mut reader = app.read().await?;
     let user = users::get(&mut reader, id).await?;
     let now = app.access.clock.now(&mut reader).await?;

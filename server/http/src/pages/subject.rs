@@ -237,7 +237,7 @@ pub(super) async fn withdraw(
         end(&app, &authorized, id, &why).await
     } else {
         Err(Error::conflict(
-            "Nothing was changed. First tick the box to confirm that all studies of this subject stop.",
+            "Nothing was changed. First tick the box to confirm that all studies of this subject will be stopped.",
         ))
     };
     answer(&app, units, id, &authorized.caller, done, SentForm::Withdrawal(why.reason)).await

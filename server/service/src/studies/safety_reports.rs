@@ -203,7 +203,11 @@ impl SafetyReports {
             }
             if let Some(answer) = session.answer().filter(|answer| answer.answer.is_about_safety()) {
                 // Naming one of the two gaits would reveal the allocation, so both are kept from walking until unblinding.
-                let by = format!("the subject in lab session {} (blinded: may be either gait)", session.number);
+                let which = match answer.answer {
+                    OrderedAnswer::UnsafeBoth => "both gaits",
+                    _ => "blinded: it may be either gait",
+                };
+                let by = format!("the subject in lab session {} ({which})", session.number);
                 let (at, source) = (answer.at, SafetyReportSource::Subject(session.id));
                 let report =
                     |trial| ReportedGait { trial, by: by.clone(), at, note: String::new(), source, review: None };

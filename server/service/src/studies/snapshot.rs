@@ -138,7 +138,7 @@ impl StudySnapshot {
         if let Some(budget) = plan.solve_seconds_budget
             && spent >= budget
         {
-            return Some(format!("The solves used {spent:.0} s of the {budget:.0} s allowed."));
+            return Some(format!("The solves took {spent:.0} s in total; the limit is {budget:.0} s."));
         }
         let limit = plan.unchanged_limit? as usize;
         // The best trial at each proposal, newest first.

@@ -97,7 +97,7 @@ class AccessMethods(Transport):
         )
 
     def create_invitation(self, study_id: StudyId, **body: Unpack[RaterInvitation]) -> CreatedRaterInvitation:
-        """Create an invitation of a rater.
+        """Create an invitation for a rater.
 
         Assigns the rater to the study and creates a one-time sign-in link. Does not accept an Idempotency-Key.
 

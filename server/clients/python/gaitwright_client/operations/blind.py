@@ -83,8 +83,8 @@ class BlindMethods(Transport):
     def list_raters(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[RaterReliability]:
         """List raters with their reliability.
 
-        Agreement of raters with their own earlier answers, position bias of unblinded raters, and unblinded answers.
-        Sorted by name.
+        Agreement of raters with their own earlier answers, position bias of unblinded raters, and the number of answers
+        that are not blind. Sorted by name.
         """
         return Pages(self, "/api/v1/studies/{id}/raters", {"id": study_id}, query={"limit": page_size})
 

@@ -54,7 +54,7 @@ class ScriptsMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[TellRequest],
     ) -> Trial:
-        """Tell the outcome of a trial.
+        """Tell the service the outcome of a trial.
 
         An outcome without a gait is also a result. If the script fails, cancel the trial instead.
 

@@ -112,7 +112,7 @@ class StudiesMethods(Transport):
     def get_study_archive(self, study_id: StudyId) -> bytes:
         """Download a study as an archive.
 
-        The archive has every row of the study, without concealed allocations, as `gaitwright export` writes it.
+        The archive has every row of the study except concealed allocations, as `gaitwright export` writes it.
         """
         return self.request_bytes("GET", "/api/v1/studies/{id}/archive", {"id": study_id})
 
@@ -318,7 +318,7 @@ class StudiesMethods(Transport):
         )
 
     def list_compared_studies(self, *, ids: str, page_size: Optional[int] = None) -> Pages[StudyComparison]:
-        """List compared studies.
+        """List studies for comparison.
 
         Properties and results of several studies. A page has at most 5 studies, because each needs a posterior. Sorted
         as in `ids`.

@@ -79,7 +79,7 @@ class SubjectsMethods(Transport):
         )
 
     def list_subject_corrections(self, subject_id: SubjectId, *, page_size: Optional[int] = None) -> Pages[Correction]:
-        """List corrections of a subject.
+        """List corrections of a subject's height and mass.
 
         Corrections of height and mass, oldest first. The last entry applies.
         """
@@ -92,7 +92,7 @@ class SubjectsMethods(Transport):
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewCorrection],
     ) -> Correction:
-        """Create a correction of a subject.
+        """Create a correction of a subject's height and mass.
 
         Corrects height and mass. New studies use the corrected values. Existing studies keep theirs.
 
@@ -146,7 +146,7 @@ class SubjectsMethods(Transport):
         *,
         page_size: Optional[int] = None,
     ) -> Pages[ReferenceGaitMatch]:
-        """List the nearest reference gaits of a subject.
+        """List the reference gaits nearest to a subject.
 
         Sorted by distance in height and body mass, the nearest first. Those without height and mass come last.
         """

@@ -245,6 +245,6 @@ class TrialsMethods(Transport):
         """Get the sensitivities of a trial.
 
         How the results of a gait change, to first order, with each tuned bound. Computed on request from the stored
-        solution, for meshes of up to 80 intervals (`gait_settings.mesh`, in sum).
+        solution, for meshes of up to 80 intervals (the sum of `gait_settings.mesh`).
         """
         return cast(TrialSensitivities, self.request_json("GET", "/api/v1/trials/{id}/sensitivities", {"id": trial_id}))

@@ -76,7 +76,7 @@ pub async fn give(
     }
     if new.number != number {
         return Err(Error::conflict(format!(
-            "Answer {} was retracted. The current answer has number {number}.",
+            "Answer {} was retracted. The next answer has number {number}.",
             new.number
         )));
     }
@@ -99,7 +99,8 @@ async fn report_unsafe(
     let walked = session.walked();
     let (gaits, blinded) = match walked {
         Some(pair) => (new.answer.unsafe_of(pair), ""),
-        None => (vec![session.trial_a, session.trial_b], "; blinded, may be either gait"),
+        None if new.answer == OrderedAnswer::UnsafeBoth => (vec![session.trial_a, session.trial_b], ""),
+        None => (vec![session.trial_a, session.trial_b], "; blinded: it may be either gait"),
     };
     match session.answer() {
         None => add(writer, caller, session.id, next_number(session), new).await,

@@ -41,7 +41,8 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     }
     let state = trial.status.and_then(trial_transitions::result_of);
     if state != Some(trial.state) {
-        return Err(format!("status {:?} contradicts the state {}", trial.status, trial.state.as_str()));
+        let status = serde_json::json!(trial.status);
+        return Err(format!("status {status} contradicts the state {}", trial.state.as_str()));
     }
     let Some(report) = &trial.report else {
         return if trial.state == TrialState::Converged {
@@ -63,7 +64,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         return Err("its results differ from its solve report".to_owned());
     }
     if converged && report.max_violation > CONVERGED_VIOLATION {
-        return Err(format!("it is converged, but its violation is {}", report.max_violation));
+        return Err(format!("its state is converged, but its violation is {}", report.max_violation));
     }
     Ok(())
 }
