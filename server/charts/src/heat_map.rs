@@ -169,7 +169,7 @@ impl HeatMap {
             let areas = areas.map(|(x, y)| Area { x, y, half_width: LEVEL_TEXT.0, half_height: LEVEL_TEXT.1 });
             let hidden = |area: &Area| taken.iter().map(|other| area.shared_with(other)).sum::<f64>();
             let Some(best) = areas.min_by(|a, b| hidden(a).total_cmp(&hidden(b))) else { continue };
-            if hidden(&best) < LEVEL_TEXT.0 * LEVEL_TEXT.1 * 2.0 {
+            if hidden(&best) < LEVEL_TEXT.0 * LEVEL_TEXT.1 {
                 taken.push(best);
                 labelled.push((contour, best));
             }
