@@ -407,9 +407,11 @@ when (select s.subject_id from trials t join studies s on s.id = t.study_id wher
     in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
--- Infeasibility explanations: at most one for each trial.
+-- Infeasibility explanations: at most one for each trial that was not stopped early. One that was stopped early keeps what the
+-- search had found.
 create table explanations (
-    trial_id       text primary key not null references trials (id),
+    trial_id       text not null references trials (id),
+    stopped_early  integer not null constraint explanations_stopped_early check (stopped_early in (0, 1)),
     -- Version of the program that computed it.
     program        text not null,
     -- SHA-256 of the explained problem, in the format of `problem.json`.
@@ -417,9 +419,11 @@ create table explanations (
     -- The tuned bound whose relaxation is the smallest that gives a gait; null if no single bound does.
     relaxed_bound  text,
     document       text not null constraint explanations_document check (json_valid(document)),
-    created_at     text not null
+    created_at     text not null,
+    primary key (trial_id, created_at)
 ) strict;
 
+create unique index explanations_complete on explanations (trial_id) where stopped_early = 0;
 create trigger explanations_no_update before update on explanations
 begin select raise(abort, 'explanations are append-only'); end;
 create trigger explanations_no_delete before delete on explanations

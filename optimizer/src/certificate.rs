@@ -87,6 +87,16 @@ impl Certificate {
         Self { failures: vec![reason.to_owned()], ..Self::empty(Vec::new()) }
     }
 
+    /// The reasons for a failure, in which the names of checks are in plain words.
+    pub fn failures_in_words(&self) -> Vec<String> {
+        let in_words = |failure: &String| {
+            let named = |check: &&Check| failure.strip_prefix(&check.name).is_some_and(|rest| rest.starts_with(": "));
+            let found = self.checks.iter().find(named);
+            found.map_or_else(|| failure.clone(), |check| failure.replacen(&check.name, &check.name_in_words(), 1))
+        };
+        self.failures.iter().map(in_words).collect()
+    }
+
     fn empty(checks: Vec<Check>) -> Self {
         Self {
             format_version: FORMAT_VERSION,

@@ -105,6 +105,10 @@ pub struct Explanation {
     /// Joint relaxations, if no single one is sufficient, smallest first.
     #[serde(default)]
     pub together: Vec<JointRelaxation>,
+    /// Whether the search was cancelled after it had found the first conflict, so that further conflicts and relaxations may
+    /// be missing.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub stopped_early: bool,
     /// Warm start of the gait that the solve had missed.
     #[serde(skip)]
     pub missed: Option<WarmStart>,
@@ -172,8 +176,8 @@ fn suspects(bounds: &TunedBounds, at_limit: BoundSet) -> Vec<usize> {
 /// Explains a solve that did not converge: finds an irreducible conflict among its tuned bounds, and the smallest
 /// relaxations that give a gait, by solves with other bounds.
 ///
-/// It takes dozens of solves; `progress` receives each step. `None` if it was cancelled, or if the solve converged or
-/// was cancelled.
+/// It takes dozens of solves; `progress` receives each step. If it is cancelled, it returns what it has found
+/// ([`Explanation::stopped_early`]), and `None` before the first conflict. `None` if the solve converged or was cancelled.
 ///
 /// # Errors
 /// [`SolveError`] if the problem is invalid or the last iterate belongs to another problem.
@@ -187,53 +191,60 @@ pub fn explain(
     if matches!(unsolved.status, SolveStatus::Converged | SolveStatus::Cancelled) {
         return Ok(None);
     }
-    match found_out(problem, unsolved, options, progress, cancel) {
-        Ok(explanation) => Ok(Some(explanation)),
-        Err(SearchEnd::Cancelled) => Ok(None),
-        Err(SearchEnd::Failed(error)) => Err(error),
+    let SolveWithoutGait { status, violations, last } = unsolved;
+    let mut explanation = Explanation {
+        status,
+        violations: violations.to_vec(),
+        conflicts: Vec::new(),
+        gait_found: false,
+        at_limit: Vec::new(),
+        relaxations: Vec::new(),
+        together: Vec::new(),
+        stopped_early: false,
+        missed: None,
+    };
+    match search_into(&mut explanation, problem, last, options, progress, cancel) {
+        Ok(()) => {}
+        Err(SearchEnd::Cancelled) if explanation.conflicts.is_empty() => return Ok(None),
+        Err(SearchEnd::Cancelled) => explanation.stopped_early = true,
+        Err(SearchEnd::Failed(error)) => return Err(error),
     }
+    explanation.relaxations.sort_by(|a, b| a.size().total_cmp(&b.size()));
+    explanation.together.sort_by(|a, b| a.size().total_cmp(&b.size()));
+    Ok(Some(explanation))
 }
 
-fn found_out(
+/// Adds everything to an explanation as soon as it is found, so that a cancelled search keeps it.
+fn search_into(
+    explanation: &mut Explanation,
     problem: &GaitProblem,
-    unsolved: SolveWithoutGait<'_>,
+    last: &WarmStart,
     options: &SolveOptions,
     progress: &mut dyn FnMut(&str),
     cancel: &CancelToken,
-) -> Result<Explanation, SearchEnd> {
-    let SolveWithoutGait { status, violations, last } = unsolved;
+) -> Result<(), SearchEnd> {
     let program = problem.program(problem.muscles)?;
     let x = &last.point.x;
     if x.len() != program.variables() {
         let sizes = format!("{} variables, expected {}", x.len(), program.variables());
         return Err(SolveError::WarmStartShape(sizes).into());
     }
-    let (mut at_limit, mut reached) = (Vec::new(), BoundSet::EMPTY);
+    let mut reached = BoundSet::EMPTY;
     for (bound, value) in problem.bounds.to_array().into_iter().enumerate() {
         let domains = domains_at_limit(problem, &program, x, bound)?;
         if !domains.is_empty() {
             let (bound_name, meaning) = (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned());
-            at_limit.push(BoundAtLimit { bound: bound_name, meaning, value, domains });
+            explanation.at_limit.push(BoundAtLimit { bound: bound_name, meaning, value, domains });
             reached = reached.with(bound);
         }
     }
-    let mut explanation = Explanation {
-        status,
-        violations: violations.to_vec(),
-        conflicts: Vec::new(),
-        gait_found: false,
-        at_limit,
-        relaxations: Vec::new(),
-        together: Vec::new(),
-        missed: None,
-    };
     let order = suspects(&problem.bounds, reached);
     let mut search = Search { problem, solves: Solves::new(problem, options, cancel), order };
     progress("searching for conflicting bounds");
     let Some(first) = search.conflict(BoundSet::EMPTY)? else {
         explanation.gait_found = true;
         explanation.missed = search.solves.gait(&problem.bounds)?;
-        return Ok(explanation);
+        return Ok(());
     };
     explanation.conflicts.push(search.described(first, BoundSet::EMPTY)?);
     let found = {
@@ -254,9 +265,7 @@ fn found_out(
             explanation.relaxations.extend(of_one_bound(relaxed));
         }
     }
-    explanation.relaxations.sort_by(|a, b| a.size().total_cmp(&b.size()));
-    explanation.together.sort_by(|a, b| a.size().total_cmp(&b.size()));
-    Ok(explanation)
+    Ok(())
 }
 
 #[cfg(test)]

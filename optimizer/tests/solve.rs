@@ -299,6 +299,17 @@ fn explanation_names_relaxations_that_give_a_gait() {
     let explanation =
         explain(&conflict, (&outcome).into(), &options, &mut progress, &CancelToken::new()).unwrap().unwrap();
     assert_eq!(asked.len(), 1 + explanation.relaxations.len() + explanation.together.len());
+    let cancel = CancelToken::new();
+    let mut cancel_at_relaxations = |question: &str| {
+        if question.contains("relaxation") {
+            cancel.cancel();
+        }
+    };
+    let stopped =
+        explain(&conflict, (&outcome).into(), &options, &mut cancel_at_relaxations, &cancel).unwrap().unwrap();
+    assert!(stopped.stopped_early && stopped.relaxations.is_empty() && !explanation.stopped_early);
+    assert_eq!(stopped.conflicts, explanation.conflicts);
+    assert!(stopped.sentences()[1].starts_with("This explanation was stopped early"));
     assert!(explanation.at_limit.iter().any(|a| a.bound == "a5" && a.domains.iter().all(|d| d.starts_with("SS"))));
     let first: Vec<&str> = explanation.conflicts[0].bounds.iter().map(|given| given.bound.as_str()).collect();
     assert!(!first.is_empty() && explanation.conflicts[0].starts > 1);

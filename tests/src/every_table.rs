@@ -53,8 +53,8 @@ pub async fn fill(database: &Path) {
         "insert into sessions (hash, id, user_id, created_at, seen_at) select hex(zeroblob(32)), 'Z', id, '', '' from users limit 1",
         "insert into certificates select trial_id, 1, 1, '{}', created_at from gaits limit 1",
         "insert into explanation_requests (trial_id, actor, created_at) select id, 'K', '' from trials limit 1",
-        "insert into explanations (trial_id, program, problem_sha256, document, created_at) \
-         select trial_id, 'P', gait_sha256, '{}', created_at from gaits limit 1",
+        "insert into explanations (trial_id, stopped_early, program, problem_sha256, document, created_at) \
+         select trial_id, 0, 'P', gait_sha256, '{}', created_at from gaits limit 1",
         "insert into blind_pair_retractions select pair_id, created_at from blind_pair_answers limit 1",
         "insert into lab_sessions (id, study_id, number, trial_a, trial_b, actor, created_at) \
          select 'L', study_id, 1, min(id), max(id), 'K', '' from trials group by study_id",

@@ -19,6 +19,8 @@ const TORSO: usize = 5;
 pub struct Clearance {
     /// How long an explanation takes.
     pub pause: Duration,
+    /// If cancelled, it has already found the conflict.
+    pub finds_conflict_first: bool,
     /// It panics instead.
     pub panics: bool,
     /// Numbers of started and of cancelled explanations.
@@ -49,7 +51,9 @@ impl Explain for Clearance {
         while begun.elapsed() < self.pause {
             if cancel.is_cancelled() {
                 self.counts.cancelled.fetch_add(1, Ordering::SeqCst);
-                return Ok(None);
+                let whole = explanation(&solve.problem.bounds, solve.status, &solve.violations);
+                let part = Explanation { relaxations: Vec::new(), stopped_early: true, ..whole };
+                return Ok(self.finds_conflict_first.then_some(part));
             }
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -94,6 +98,7 @@ pub fn explanation(bounds: &TunedBounds, status: SolveStatus, violations: &[Viol
         conflicts: vec![conflict],
         gait_found: false,
         together: Vec::new(),
+        stopped_early: false,
         missed: None,
         at_limit: vec![at_limit(CLEARANCE, "SS2_R"), at_limit(TORSO, "stride")],
         relaxations: vec![relaxed(CLEARANCE, Some(0.03), bounds[CLEARANCE]), relaxed(TORSO, None, 1.0)],

@@ -204,6 +204,39 @@ async fn requested_explanation_is_made_after_a_restart() {
 }
 
 #[tokio::test]
+async fn cancelled_explanation_keeps_the_conflict_until_a_complete_one_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let explainer = Clearance { finds_conflict_first: true, ..Clearance::slow(FOR_EVER) };
+    let counts = explainer.counts.clone();
+    let service = Service::start_explaining(&database, Analytic::slow(Duration::from_millis(5)), explainer).await;
+    let study = service.study(|new| (new.number_of_trials, new.search_space) = (9, Some(without_gaits().into()))).await;
+    service.wait_for_trials(study, 1).await;
+    service.post(&format!("/api/v1/studies/{study}/pause"), &json!({})).await;
+    let trial = without_gait(&service, study).await[0].id;
+    assert_eq!(ask(&service, trial).await.status, StatusCode::ACCEPTED);
+    until("it is begun", async || counts.begun.load(Ordering::SeqCst) == 1).await;
+    let job = format!("/api/v1/jobs/explanation-{trial}");
+    assert_eq!(service.post(&format!("{job}/cancel"), &json!({})).await.json()["state"], "cancelled");
+    let part = explained(&service, trial).await;
+    assert_eq!((&part["stopped_early"], &part["relaxations"]), (&json!(true), &json!([])));
+    assert_eq!(part["conflicts"][0]["bounds"][0]["bound"], "a5");
+    assert_eq!(service.fetch(&job).await.json()["state"], "cancelled");
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    assert!(page.contains("was stopped early") && page.contains("Search again, to the end"), "{page}");
+    service.stop().await;
+
+    let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
+    assert_eq!(explained(&service, trial).await["stopped_early"], true, "it is on record");
+    assert_eq!(ask(&service, trial).await.status, StatusCode::ACCEPTED);
+    until("it is complete", async || explained(&service, trial).await["stopped_early"] == false).await;
+    let page = service.fetch(&format!("/trials/{trial}")).await.text;
+    assert!(!page.contains("was stopped early") && !page.contains("Search again"), "{page}");
+    assert_eq!(ask(&service, trial).await.status, StatusCode::OK, "nothing is left to do");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn withdrawal_stops_explanations() {
     let folder = tempfile::tempdir().unwrap();
     let explainer = Clearance::slow(FOR_EVER);

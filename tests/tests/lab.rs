@@ -20,6 +20,7 @@ use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
+use std::fmt::Write;
 use tempfile::TempDir;
 
 const FORM: &str = "application/x-www-form-urlencoded";
@@ -484,7 +485,7 @@ async fn emg_recordings_are_compared_with_normal_walking_and_can_be_reprocessed(
     let page = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
     assert!(page.contains("EMG, left tibialis anterior") && page.contains("low-pass 3 Hz, order 2"), "{page}");
     assert!(page.contains("Means of 5 strides (without the device), 5 strides (walk 2)"), "{page}");
-    assert!(page.contains("EMG RMSE, walk 2"), "{page}");
+    assert!(page.contains(">EMG RMSE</th>") && page.contains(">walk 2</th>"), "{page}");
     service.stop().await;
 }
 
@@ -610,6 +611,35 @@ async fn limit_cycles_are_drawn_over_the_gait_after_unblinding() {
 }
 
 #[tokio::test]
+async fn joint_angle_preview_shows_strides_and_stores_nothing() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    let page = format!("/lab-sessions/{}/measurement-files/joint-angles", id(&session));
+    let mut file = "time_s,torso_rad,hip_R_rad,knee_R_rad\n".to_owned();
+    for sample in 0..1200 {
+        let phase = std::f64::consts::TAU * f64::from(sample) / 120.0;
+        let row = (f64::from(sample) / 100.0, 0.02 * phase.sin(), 0.4 * phase.cos(), 0.3 + 0.2 * phase.sin());
+        writeln!(file, "{},{},{},{}", row.0, row.1, row.2, row.3).unwrap();
+    }
+    let send = async |file: &str| {
+        let form = format!("walk=1&format=csv&cutoff_hz=6&file_name=angles.csv&button=preview&recording={file}");
+        service.post_text(&page, FORM, &form).await
+    };
+    let shown = send(&file).await;
+    assert_eq!(shown.status, StatusCode::OK, "{}", shown.text);
+    assert!(shown.text.contains("The recording can be uploaded: angles.csv."), "{}", shown.text);
+    assert_eq!(shown.text.matches("angle, ° over time, s\"").count(), 3, "a chart for each joint");
+    assert!(shown.text.contains("right heel strike") && shown.text.contains("<td>a stride</td>"), "{}", shown.text);
+    let short: String = file.lines().take(200).fold(String::new(), |text, line| text + line + "\n");
+    assert!(send(&short).await.text.contains("Not ready for upload"));
+    assert_eq!(send("time_s,hip_R_rad%0A0,x").await.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let files = service.fetch(&format!("/api/v1/lab-sessions/{}/measurement-files", id(&session))).await.items();
+    assert_eq!(files, json!([]));
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_left_out() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
@@ -635,8 +665,8 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
     );
     let shown =
         send(&format!("button=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
-    assert!(shown.text.contains("The file can be uploaded: walk1.csv."), "{}", shown.text);
-    assert_eq!(shown.text.matches("raw signal</span>").count(), 6, "a chart for each channel");
+    assert!(shown.text.contains("The recording can be uploaded: walk1.csv."), "{}", shown.text);
+    assert_eq!(shown.text.matches("raw signal over time, s\"").count(), 6, "a chart for each channel");
     assert!(shown.text.contains("<option selected>EMG 1</option>") && shown.text.contains("<td>rejected</td>"));
     assert_eq!(files().await, json!([]), "a preview stores nothing");
     let unreadable = service.post_text(&page, FORM, "walk=1&format=csv&recording=time_s,a%0A0,x&button=preview").await;

@@ -26,6 +26,11 @@ function runsOf(path) {
   return runs;
 }
 
+/** Reads a chart again after its drawing has changed. @param {SVGSVGElement} chart */
+export function forgetLines(chart) {
+  known.delete(chart);
+}
+
 /** @param {SVGSVGElement} chart @returns {Line[]} */
 export function linesOf(chart) {
   const before = known.get(chart);

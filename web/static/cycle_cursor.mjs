@@ -36,7 +36,7 @@ class ChartCursor {
   /** @param {SVGSVGElement} chart */
   constructor(chart) {
     this.chart = chart;
-    this.right = String(chart.dataset.right).split(" ").map(Number);
+    this.right = this.axis();
     const [bottom, top] = String(chart.dataset.up).split(" ").map(Number);
     this.cycles = String(chart.dataset.cycles)
       .split(",")
@@ -47,17 +47,33 @@ class ChartCursor {
       const bar = document.createElementNS(SVG, "path");
       bar.setAttribute("class", `cursor ${colour === "*" ? "" : colour}`);
       bar.setAttribute("d", `M0 ${top}V${bottom}`);
-      // A reference does not move.
-      const lines = linesOf(chart).filter(({ key }) => (colour === "*" || key.includes(` ${colour} `)) && !key.endsWith(" dotted"));
-      const dots = lines.map((line) => {
+      const dots = this.linesOf(colour).map((line) => {
         const dot = document.createElementNS(SVG, "circle");
         dot.setAttribute("class", `cursor_dot ${line.key.match(/c\d/)?.[0]}`);
         dot.setAttribute("r", "5");
         return { line, dot };
       });
       layer.append(bar, ...dots.map(({ dot }) => dot));
-      return { begins, bar, dots };
+      return { colour, begins, bar, dots };
     });
+    chart.addEventListener("zoom", () => this.readAgain());
+  }
+
+  /** Where the axis begins and ends, and the percentages there. */
+  axis() {
+    return String(this.chart.dataset.right).split(" ").map(Number);
+  }
+
+  /** The lines of a cycle, without a reference, which does not move. @param {string} colour */
+  linesOf(colour) {
+    return linesOf(this.chart).filter(({ key }) => (colour === "*" || key.includes(` ${colour} `)) && !key.endsWith(" dotted"));
+  }
+
+  /** Reads the chart after it was zoomed. */
+  readAgain() {
+    this.right = this.axis();
+    for (const { colour, dots } of this.marks) this.linesOf(colour).forEach((line, i) => (dots[i].line = line));
+    this.draw();
   }
 
   /** @param {number} percent Of the axis. */
@@ -69,9 +85,11 @@ class ChartCursor {
   draw() {
     for (const { begins, bar, dots } of this.marks) {
       const x = this.place(wrapped(100 * now - begins));
+      const isShown = this.right[0] - 0.1 <= x && x <= this.right[1] + 0.1;
+      bar.setAttribute("visibility", isShown ? "visible" : "hidden");
       bar.setAttribute("transform", `translate(${x.toFixed(1)} 0)`);
       for (const { line, dot } of dots) {
-        const y = heightAt(line, x);
+        const y = isShown ? heightAt(line, x) : null;
         dot.setAttribute("visibility", y === null ? "hidden" : "visible");
         dot.setAttribute("cx", x.toFixed(1));
         if (y !== null) dot.setAttribute("cy", y.toFixed(1));

@@ -32,6 +32,8 @@ function along(chart, y) {
  * @param {SVGSVGElement} chart @param {number} x
  */
 function acrossLines(chart, x) {
+  const [begin, end] = String(chart.dataset.right).split(" ").map(Number);
+  if (x < begin || x > end) return [];
   const values = linesOf(chart).flatMap((line) => {
     const y = heightAt(line, x);
     return y === null ? [] : [`${nameOf(chart, line.key)}: ${along(chart, y)}`];

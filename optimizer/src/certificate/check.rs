@@ -20,6 +20,19 @@ pub struct Check {
 }
 
 impl Check {
+    /// The name with the number of the constraint behind it: `Equations of motion, forces, at nodes (C1)`.
+    pub fn name_in_words(&self) -> String {
+        let is_number =
+            |word: &str| word.strip_prefix('C').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+        let (number, name) = match self.name.split_once(' ').filter(|(word, _)| is_number(word)) {
+            Some((number, name)) => (format!(" ({})", number.replace('-', " to ")), name),
+            None => (String::new(), self.name.as_str()),
+        };
+        let mut letters = name.chars();
+        let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+        format!("{first}{}{number}", letters.as_str())
+    }
+
     /// Whether the value is within its limit.
     pub fn passed(&self) -> bool {
         self.limit.is_none_or(|limit| self.value.is_some_and(|value| value <= limit))
@@ -114,5 +127,36 @@ impl WorstValues {
             check.name.push_str(where_measured);
         }
         self.checks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::certificate::Certificate;
+
+    fn named(name: &str) -> Check {
+        Check { name: name.to_owned(), unit: String::new(), value: None, limit: None, place: String::new() }
+    }
+
+    #[test]
+    fn number_of_a_constraint_is_behind_its_name() {
+        let words = [
+            ("C1 equations of motion, forces, at nodes", "Equations of motion, forces, at nodes (C1)"),
+            ("C5-C7 equilibrium of fibre and tendon", "Equilibrium of fibre and tendon (C5 to C7)"),
+            ("Cost of transport", "Cost of transport"),
+            ("torques of the closed loop", "Torques of the closed loop"),
+        ];
+        for (name, expected) in words {
+            assert_eq!(named(name).name_in_words(), expected);
+        }
+    }
+
+    #[test]
+    fn failures_name_checks_in_plain_words() {
+        let mut failed = Certificate::failed_because("C3 feet: 1 m (stride), limit 0 m");
+        failed.failures.push("the gait is unstable".to_owned());
+        failed.checks = vec![named("C3"), named("C3 feet")];
+        assert_eq!(failed.failures_in_words(), ["Feet (C3): 1 m (stride), limit 0 m", "the gait is unstable"]);
     }
 }

@@ -241,12 +241,20 @@ impl Explanation {
         alone.chain(together).chain(in_vain).collect()
     }
 
+    /// What may be missing from an explanation that was stopped early, as a sentence.
+    pub fn stopped_in_words(&self) -> Option<&'static str> {
+        self.stopped_early.then_some(
+            "This explanation was stopped early: further conflicts, and other or smaller relaxations, may exist.",
+        )
+    }
+
     /// The explanation as sentences.
     pub fn sentences(&self) -> Vec<String> {
         let status = status_in_words(self.status).map(str::to_owned);
         let at_limit = self.at_limit.iter().map(BoundAtLimit::in_words);
         let conflicts = self.conflicts_in_words().into_iter();
-        status.into_iter().chain(conflicts).chain(self.remedies_in_words()).chain(at_limit).collect()
+        let stopped = self.stopped_in_words().map(str::to_owned);
+        status.into_iter().chain(stopped).chain(conflicts).chain(self.remedies_in_words()).chain(at_limit).collect()
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod axis;
 mod chart;
+mod contours;
 pub mod csv_table;
 mod escaped_text;
 mod figure;

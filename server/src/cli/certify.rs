@@ -75,10 +75,10 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
             certified.unsmoothed_cost_of_transport
         ));
     }
-    lines.extend(certificate.failures.iter().map(|failure| format!("  failure: {failure}")));
+    lines.extend(certificate.failures_in_words().iter().map(|failure| format!("  failure: {failure}")));
     for check in &certificate.checks {
         let (value, limit) = (check.value_in_words(), check.limit_in_words());
-        lines.push(format!("  {}: {value} (allowed: {limit}; {})", check.name, check.place));
+        lines.push(format!("  {}: {value} (allowed: {limit}; {})", check.name_in_words(), check.place));
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(

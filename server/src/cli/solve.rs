@@ -67,7 +67,7 @@ pub(super) struct SolveCommand {
     #[arg(long)]
     json: bool,
     /// If no gait is found, explain which bounds conflict, and whether relaxing any one of them, or a few together, gives
-    /// a gait. Takes dozens of solves.
+    /// a gait. Takes dozens of solves; Ctrl-C stops it and prints what it has found.
     #[arg(long)]
     explain: bool,
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.
@@ -123,6 +123,7 @@ impl SolveCommand {
         options.threads = cores_or(None).min(MOST_THREADS);
         // Before the output file is created, so that a signal cannot leave it behind.
         let cancel = cancelled_by_signal();
+        let stopped = cancel.clone();
         let inputs: Vec<&Path> = self.flags.inputs().into_iter().chain(self.problem.as_deref()).collect();
         let out = self.out.as_deref().map(|out| OutFile::open(out, &inputs)).transpose()?;
         let bar = ProgressBar::new_spinner();
@@ -144,7 +145,11 @@ impl SolveCommand {
                     shown.suspend(|| tell(question));
                     shown.set_message(question.to_owned());
                 };
-                explanation::explain(&problem, (&outcome).into(), &options, &mut progress, &cancel)?
+                let found = explanation::explain(&problem, (&outcome).into(), &options, &mut progress, &cancel)?;
+                if found.is_none() && cancel.is_cancelled() {
+                    tell("The explanation was stopped before it had found a conflict.");
+                }
+                found
             } else {
                 None
             };
@@ -194,7 +199,8 @@ impl SolveCommand {
             let kept = SolveFile { outcome: &outcome, lineage: &lineage };
             out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
         }
-        Ok(CommandEnd::Done)
+        let was_stopped = explain && !converged && stopped.is_cancelled();
+        Ok(if was_stopped { CommandEnd::Interrupted } else { CommandEnd::Done })
     }
 }
 

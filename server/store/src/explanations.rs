@@ -24,12 +24,13 @@ pub struct StoredExplanation {
     pub created_at: Instant,
 }
 
-/// The explanation of a trial, if there is one.
+/// The explanation of a trial, if there is one: the one that was not stopped early, or else the newest.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<StoredExplanation>> {
-    let row = sqlx::query("select * from explanations where trial_id = ?").bind(trial).fetch_optional(db).await?;
+    let sql = "select * from explanations where trial_id = ? order by stopped_early, created_at desc limit 1";
+    let row = sqlx::query(sql).bind(trial).fetch_optional(db).await?;
     row.map(|row| {
         Ok(StoredExplanation {
             program: row.try_get("program")?,
@@ -41,7 +42,7 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Sto
     .transpose()
 }
 
-/// Stores an explanation. Returns `false` if the trial has one already, which is kept.
+/// Stores an explanation. Returns `false` if the trial has a complete one already, which is kept.
 ///
 /// # Errors
 /// Errors of the database.
@@ -52,10 +53,13 @@ pub async fn insert(
     explanation: &Explanation,
 ) -> StoreResult<bool> {
     let done = sqlx::query(
-        "insert into explanations (trial_id, program, problem_sha256, relaxed_bound, document, created_at) \
-         values (?, ?, ?, ?, ?, ?) on conflict do nothing",
+        "insert into explanations \
+         (trial_id, stopped_early, program, problem_sha256, relaxed_bound, document, created_at) \
+         select ?1, ?2, ?3, ?4, ?5, ?6, ?7 where not exists \
+         (select 1 from explanations where trial_id = ?1 and stopped_early = 0) on conflict do nothing",
     )
     .bind(trial)
+    .bind(explanation.stopped_early)
     .bind(Actor::program().as_str())
     .bind(json_columns::sha256(problem.as_bytes()))
     .bind(explanation.relief().map(|relaxation| relaxation.bound.as_str()))
@@ -85,7 +89,7 @@ pub async fn is_requested(db: &mut Connection, trial: TrialId) -> StoreResult<bo
     Ok(found.await?.is_some())
 }
 
-/// The trials with a requested explanation that is not stored yet, and their studies, oldest request first. Only studies
+/// The trials with a requested explanation that is not complete yet, and their studies, oldest request first. Only studies
 /// that the caller can access, of subjects who have not withdrawn consent.
 ///
 /// # Errors
@@ -95,7 +99,7 @@ pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(Tr
     let rows = sqlx::query(concat!(
         "select r.trial_id, t.study_id from explanation_requests r join trials t on t.id = r.trial_id \
          join studies s on s.id = t.study_id \
-         where r.trial_id not in (select trial_id from explanations) \
+         where r.trial_id not in (select trial_id from explanations where stopped_early = 0) \
          and s.subject_id not in (select subject_id from withdrawn_subjects) and ",
         reached!("t.study_id"),
         " order by r.created_at, r.trial_id"
@@ -108,8 +112,8 @@ pub async fn requested(db: &mut Connection, reach: Reach) -> StoreResult<Vec<(Tr
     rows.iter().map(|row| Ok((row.try_get("trial_id")?, row.try_get("study_id")?))).collect()
 }
 
-/// The first trial of an ended study that did not converge, can be explained and has no explanation, except those in
-/// `refused`. `None` if the subject withdrew consent.
+/// The first trial of an ended study that did not converge, can be explained and has no complete explanation, except those
+/// in `refused`. `None` if the subject withdrew consent.
 ///
 /// # Errors
 /// Errors of the database.
@@ -122,7 +126,7 @@ pub async fn next_of_ended(
         "select t.id from trials t join studies s on s.id = t.study_id \
          where t.study_id = ? and t.state = 'not_converged' and t.script is null \
          and s.state in ('finished', 'stopped') \
-         and t.id in (select trial_id from gaits) and t.id not in (select trial_id from explanations) \
+         and t.id in (select trial_id from gaits) and t.id not in (select trial_id from explanations where stopped_early = 0) \
          and t.id not in (select value from json_each(?)) \
          and s.subject_id not in (select subject_id from withdrawn_subjects) \
          order by t.number limit 1",
@@ -153,14 +157,14 @@ pub struct Relief {
     pub instance: (TrialId, u32),
 }
 
-/// Summary of the explanations of a study.
+/// Summary of the complete explanations of a study.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn in_common(db: &mut Connection, study: StudyId) -> StoreResult<Common> {
     let rows = sqlx::query(
         "select e.relaxed_bound, count(*) as trials, min(t.number) as number, t.id from explanations e \
-         join trials t on t.id = e.trial_id where t.study_id = ? group by e.relaxed_bound \
+         join trials t on t.id = e.trial_id where t.study_id = ? and e.stopped_early = 0 group by e.relaxed_bound \
          order by trials desc, e.relaxed_bound",
     )
     .bind(study)

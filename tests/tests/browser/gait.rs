@@ -1,6 +1,7 @@
 //! The page of a gait.
 
-use crate::chromium::Chromium;
+use crate::axe::Axe;
+use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::StudyState;
@@ -8,6 +9,12 @@ use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::explained::{Clearance, without_gaits};
 use std::time::Duration;
+
+async fn is_accessible(axe: Option<&Axe>, page: &Tab) {
+    let Some(axe) = axe else { return };
+    let complaints = axe.complaints(page).await;
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
 
 async fn with_a_gait() -> (Site, TrialId) {
     let site = Site::start(Analytic::default()).await;
@@ -99,6 +106,53 @@ async fn browser_has_one_cursor_for_walker_and_charts() {
     assert_eq!(page.value(ghost).await, "hidden");
     page.click("[data-overlay]").await;
     assert_eq!(page.value(ghost).await, "visible");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_zooms_charts_to_a_part_of_the_cycle() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let axe = Axe::find();
+    let (site, trial) = with_a_gait().await;
+    let page = browser.open(&site.at(&format!("/trials/{trial}"))).await;
+    page.wait_for("[data-play]").await;
+    page.wait_for("#angles .cursor").await;
+    let scrub = "document.querySelector('[data-scrub]').value";
+    page.click("[data-play]").await;
+    let before = page.value(scrub).await;
+    // Drags from 20 % to 60 % of the first chart, with a finger.
+    page.click("#angles .zoom summary").await;
+    page.wait_for("body.chooses_part").await;
+    is_accessible(axe.as_ref(), &page).await;
+    let drag = "const c = document.querySelector('#angles svg.chart'); const m = c.getScreenCTM(); \
+                const send = (kind, x) => c.dispatchEvent(new PointerEvent(kind, { bubbles: true, button: 0, pointerType: 'touch', \
+                  clientX: m.e + m.a * x, clientY: m.f + m.d * 200 })); \
+                send('pointerdown', 74 + 542 * 0.2); send('pointermove', 74 + 542 * 0.5); send('pointerup', 74 + 542 * 0.6);";
+    page.run(drag).await;
+    let ends = "[...document.querySelectorAll('#angles svg.chart[data-right], #forces svg.chart[data-right]')].map(c => c.dataset.right)";
+    let alike = |part: &str| format!("{ends}.every(right => right.endsWith(' {part}'))");
+    page.wait_until(&alike("20 60")).await;
+    assert_eq!(page.value(scrub).await, before, "the drag that chooses a part does not move the walker");
+    assert_eq!(page.count("details.zoom[open]").await, 0);
+    let ticks = "[...document.querySelectorAll('#angles svg.chart')[0].querySelectorAll('.tick.x:not([hidden])')].map(t => t.textContent).join(' ')";
+    assert_eq!(page.value(ticks).await, "20 30 40 50 60");
+    // Cursor and readout follow the zoomed axis: half of the right leg's cycle is at three quarters of this part.
+    page.run("const s = document.querySelector('[data-scrub]'); s.value = 50; s.dispatchEvent(new Event('input'))")
+        .await;
+    let cursor = "[...document.querySelector('#angles svg.chart').parentElement.querySelectorAll('.cursor')] \
+                  .map(c => [c.getAttribute('visibility'), Math.round(c.getAttribute('transform').match(/-?[\\d.]+/)[0])].join(' ')).join(', ')";
+    let place = 74.0_f64 + 542.0 * 0.75;
+    assert_eq!(page.value(cursor).await.split(", ").last(), Some(format!("visible {}", place.round()).as_str()));
+    is_accessible(axe.as_ref(), &page).await;
+    page.click("#angles .zoom_reset").await;
+    page.wait_until(&alike("0 100")).await;
+    // The same by typing.
+    page.click("#forces .zoom summary").await;
+    page.fill("#forces .zoom [name=from]", "50").await;
+    page.fill("#forces .zoom [name=to]", "75").await;
+    page.click("#forces .zoom form button").await;
+    page.wait_until(&alike("50 75")).await;
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

@@ -126,7 +126,7 @@ async fn browser_previews_an_emg_recording_and_rejects_a_stride() {
     page.click("button[value=preview]").await;
     page.wait_for("#preview").await;
     let preview = page.text("#preview").await;
-    assert!(preview.contains("The file can be uploaded: walk 1.csv"), "{preview}");
+    assert!(preview.contains("The recording can be uploaded: walk 1.csv"), "{preview}");
     is_for_everybody(axe.as_ref(), &page, "a preview").await;
     page.click("[data-strides] tbody tr:nth-child(2) input").await;
     page.wait_until("document.querySelector('#rejected_strides').value === '2'").await;

@@ -86,6 +86,9 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
     visit.page.wait_for("h1").await;
     let emg = visit.page.text("main").await;
     assert!(emg.contains("EMG, left rectus femoris"), "{emg}");
+    visit.page.resize(390, 844).await;
+    let hidden = "[...document.querySelectorAll('#emg .scroll')].filter(t => t.scrollWidth > t.clientWidth + 1).length";
+    visit.page.wait_until(&format!("{hidden} === 0")).await;
     assert_eq!(visit.presses, 2);
     println!("{}: 2 presses, {:.1} s", visit.question, visit.begun.elapsed().as_secs_f64());
     browser.close().await;

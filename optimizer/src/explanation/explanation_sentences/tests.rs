@@ -59,6 +59,7 @@ fn explanation() -> Explanation {
         at_limit: vec![at_limit(1, 20.0, &["DS2_L", "SS1_L"]), at_limit(3, 0.5, &["stride"])],
         relaxations: vec![relaxation(6, (5.0, Some(15.0), 14.6)), relaxation(3, (0.5, None, 3.0))],
         together: Vec::new(),
+        stopped_early: false,
         missed: None,
     }
 }
@@ -74,6 +75,7 @@ fn headline_names_limits_with_their_direction() {
             at_limit: Vec::new(),
             relaxations: Vec::new(),
             together: Vec::new(),
+            stopped_early: false,
             missed: None,
         };
         empty.headline().unwrap()

@@ -3421,6 +3421,9 @@ class TrialExplanation(TypedDict):
     sentences: list[str]
     # Status of the solve.
     status: SolveStatus
+    # Whether the explanation was cancelled after it had found the first conflict. Further conflicts and relaxations may
+    # then be missing; another request makes a complete explanation.
+    stopped_early: bool
     # Effect of relaxing several bounds together, if no single one helps.
     together: list[JointRelaxation]
     # Explained trial.

@@ -43,6 +43,9 @@ pub(super) struct TrialExplanation {
     relaxations: Vec<Relaxation>,
     /// Effect of relaxing several bounds together, if no single one helps.
     together: Vec<JointRelaxation>,
+    /// Whether the explanation was cancelled after it had found the first conflict. Further conflicts and relaxations may then
+    /// be missing; another request makes a complete explanation.
+    stopped_early: bool,
     /// Version of the program that made it.
     program: String,
     /// SHA-256 of the trial's `problem.json`.
@@ -57,6 +60,7 @@ impl TrialExplanation {
         Self {
             trial_id,
             sentences: explanation.sentences(),
+            stopped_early: explanation.stopped_early,
             status: explanation.status.into(),
             violations: explanation.violations.into_iter().map(Into::into).collect(),
             conflicts: explanation.conflicts.into_iter().map(Into::into).collect(),
@@ -112,7 +116,7 @@ pub(super) async fn get(
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses(
-        (status = 200, description = "Finished job for the existing explanation", body = Job),
+        (status = 200, description = "Finished job for the existing, complete explanation", body = Job),
         (status = 202, description = "Job that computes the explanation. It takes a few minutes and has lower priority than solves", body = Job)
     ),
     security(("token" = ["run"]), ("session" = ["run"])),

@@ -193,18 +193,22 @@ pub(crate) fn maps(
         let dimension = &space.dimensions()[place];
         (format!("{}: {}", dimension.name, meaning(&dimension.name)), dimension.values.clone())
     };
-    let draw = |title: &str, cells, range| {
+    let draw = |title: &str, cells, range, in_percent| {
         let group = format!("{} {}", space.dimensions()[right].name, space.dimensions()[down].name);
-        Figure::map(&group, HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range })
+        Figure::map(
+            &group,
+            HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range, in_percent },
+        )
     };
-    let figures = vec![draw("Utility", utility, range), draw("Probability of converging", converging, (0.0, 1.0))];
+    let figures =
+        vec![draw("Utility", utility, range, false), draw("Probability of converging", converging, (0.0, 1.0), true)];
     Ok(Maps { dimensions, held, figures })
 }
 
 /// The text below each map.
 pub(crate) const MAP_NOTES: [&str; 2] = [
-    "Mean ± standard deviation. The frame marks the best action.",
-    "The small numbers count the trials with these two values: yes means converged, no means not converged.",
+    "Mean ± standard deviation. Lines connect equal means. The frame marks the best action.",
+    "Lines connect equal probabilities. The small numbers count the trials with these two values: yes means converged, no means not converged.",
 ];
 
 /// How many trials with these levels converged and how many did not.

@@ -4,10 +4,8 @@ use gait_optimizer::Gait;
 use gait_optimizer::emg::CycleActivity;
 use gait_optimizer::phase_portrait::JOINTS;
 use gaitwright_charts::gait_charts::orbit;
-use gaitwright_charts::{Chart, Figure, Span, Stroke};
-use gaitwright_service::studies::lab::{
-    EmgPreview, EmgView, LabSessionView, LimitCycles, Stride, Trace, WalkCondition,
-};
+use gaitwright_charts::{Chart, Figure, Stroke};
+use gaitwright_service::studies::lab::{EmgView, LabSessionView, LimitCycles, WalkCondition};
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Names of the EMG channels.
@@ -44,32 +42,9 @@ pub(crate) fn muscles() -> [(&'static str, &'static str); 6] {
     MUSCLES
 }
 
-/// The raw channels of a recording with their heel strikes and numbered strides. Strides that are left out are shaded.
-pub(crate) fn preview(preview: &EmgPreview) -> Vec<Chart> {
-    let span = |stride: &Stride| Span {
-        from: stride.start_s,
-        to: stride.end_s,
-        name: stride.number.to_string(),
-        shaded: stride.rejected || !stride.is_plausible,
-    };
-    let chart = |trace: &Trace| {
-        let title = format!("{}: column {}", muscle_name(trace.channel), trace.column);
-        let mut chart = Chart::new(&title, "time, s", "raw signal");
-        chart = chart.with("raw signal", 0, Stroke::Solid, trace.points.clone());
-        if !trace.at_strikes.is_empty() {
-            // Above the trace, which would hide them.
-            let (low, high) = trace
-                .points
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, y)| (low.min(*y), high.max(*y)));
-            let above = high + 0.1 * (high - low);
-            let marks = trace.at_strikes.iter().map(|(time, _)| (*time, above)).collect();
-            chart = chart.with("right heel strike", 1, Stroke::Points, marks);
-        }
-        chart.spans = preview.strides.iter().map(span).collect();
-        chart
-    };
-    preview.traces.iter().map(chart).collect()
+/// The name of a joint, one of [`JOINTS`].
+pub(crate) fn joint_name(joint: &str) -> &str {
+    JOINTS.iter().zip(JOINT_NAMES).find(|(known, _)| **known == joint).map_or(joint, |(_, name)| name)
 }
 
 /// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation

@@ -4,6 +4,7 @@ pub(crate) mod analysis;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 mod outcome;
+pub(crate) mod recording_traces;
 pub(crate) mod reference_figures;
 pub(crate) mod study;
 mod study_progress;

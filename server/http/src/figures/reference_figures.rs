@@ -1,8 +1,9 @@
 //! The figures of a reference gait.
 
+use super::recording_traces::StrideSpan;
 use gait_optimizer::ReferenceGait;
-use gaitwright_charts::{Chart, Figure, Span, Stroke, gait_charts};
-use gaitwright_service::studies::reference_preview::{AngleTrace, ReferencePreview};
+use gait_optimizer::reference::RecordedStride;
+use gaitwright_charts::{Figure, gait_charts};
 
 /// Every figure of a reference gait.
 pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
@@ -10,29 +11,13 @@ pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
     charts.map(|chart| Figure::chart("reference", chart)).collect()
 }
 
-/// The angles of a recording with its heel strikes and numbered strides. Strides that are left out are shaded.
-pub(crate) fn preview(preview: &ReferencePreview) -> Vec<Chart> {
-    let strides = (1..).zip(&preview.strides);
-    let spans: Vec<Span> = strides
-        .map(|(number, stride): (u32, _)| Span {
-            from: stride.start_s,
-            to: stride.end_s,
-            name: number.to_string(),
-            shaded: !stride.is_used,
-        })
-        .collect();
-    let chart = |trace: &AngleTrace| {
-        let mut chart =
-            Chart::new(trace.joint, "time, s", "angle, °").with("recorded", 0, Stroke::Solid, trace.points.clone());
-        if !preview.strikes_s.is_empty() {
-            // Above the curve, which would hide them.
-            let angles = || trace.points.iter().map(|(_, angle)| *angle);
-            let (low, high) = (angles().fold(f64::INFINITY, f64::min), angles().fold(f64::NEG_INFINITY, f64::max));
-            let marks = preview.strikes_s.iter().map(|time| (*time, high + 0.1 * (high - low))).collect();
-            chart = chart.with("right heel strike", 1, Stroke::Points, marks);
-        }
-        chart.spans.clone_from(&spans);
-        chart
+/// The strides of a recording for its charts.
+pub(crate) fn stride_spans(strides: &[RecordedStride]) -> Vec<StrideSpan> {
+    let span = |(number, stride): (usize, &RecordedStride)| StrideSpan {
+        number,
+        start_s: stride.start_s,
+        end_s: stride.end_s,
+        left_out: !stride.is_used,
     };
-    preview.traces.iter().map(chart).collect()
+    (1..).zip(strides).map(span).collect()
 }

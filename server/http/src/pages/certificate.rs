@@ -65,8 +65,9 @@ impl InWords {
             );
             values.push(("Pushes at the hip from which the walker recovers", words));
         }
+        let failures = certificate.failures_in_words();
         let checks = certificate.checks.into_iter().map(FormattedCheck::new).collect();
-        Self { passed: certificate.passed, failures: certificate.failures, values, checks }
+        Self { passed: certificate.passed, failures, values, checks }
     }
 }
 
@@ -86,7 +87,7 @@ impl FormattedCheck {
         Self {
             value: in_unit(check.value, "not determined"),
             limit: in_unit(check.limit, "no limit; reported only"),
-            name: check.name,
+            name: check.name_in_words(),
             place: check.place,
         }
     }

@@ -64,8 +64,17 @@ impl NoGait {
         matches!(self.state, ExplanationState::BeingMade | ExplanationState::Waiting)
     }
 
+    /// Whether the page waits for an explanation: one that is being stopped still keeps what it has found.
+    pub(super) fn may_appear(&self) -> bool {
+        self.is_pending() || self.state == ExplanationState::NotAsked
+    }
+
     pub(super) fn may_be_asked(&self) -> bool {
-        matches!(self.state, ExplanationState::Waiting | ExplanationState::NotAsked)
+        match &self.state {
+            ExplanationState::Waiting | ExplanationState::NotAsked => true,
+            ExplanationState::Made(made) => made.explanation.stopped_early,
+            ExplanationState::BeingMade | ExplanationState::Refused(_) => false,
+        }
     }
 
     pub(super) fn amount(violation: &Violation) -> String {

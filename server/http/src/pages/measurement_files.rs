@@ -1,8 +1,8 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
 use super::lab;
-use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields, MeasurementPreview};
-use super::page_chart::PageChart;
+use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields, PreviewedEmg};
+use super::recording_preview::RecordingPreview;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -16,7 +16,7 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{self as session, CheckedFile, EmgPreview};
+use gaitwright_service::studies::lab::{self as session, CheckedFile};
 use gaitwright_store::{LabSessionId, commit};
 
 /// `POST /lab-sessions/{id}/measurement-files/emg`.
@@ -27,14 +27,9 @@ pub(super) async fn emg(
     Form(fields): Form<EmgFields>,
 ) -> Result<Response, PageError> {
     if fields.previews() {
-        let (preview, refused) = match previewed(&mut app, &fields).await {
-            Ok(preview) => (Some(preview), None),
-            Err(error @ Error::Invalid(_)) => (None, Some(form_errors::in_words(&error))),
-            Err(other) => return Err(other.into()),
-        };
-        let status = if refused.is_some() { StatusCode::UNPROCESSABLE_ENTITY } else { StatusCode::OK };
+        let (preview, refused) = or_refused(previewed_emg(&mut app, &fields).await)?;
         let forms = Forms { emg: fields, open: "emg", preview, ..Forms::default() };
-        return Ok((status, lab::show(&mut app, id, &authorized.caller, forms, refused).await?).into_response());
+        return show_preview(&mut app, id, &authorized, forms, refused).await;
     }
     let kept = async {
         let checked = fields.read()?.checked(app.store_mut()).await?;
@@ -51,6 +46,11 @@ pub(super) async fn joint_angles(
     Id(id, _): Id<LabSessionId, Run>,
     Form(fields): Form<JointAngleFields>,
 ) -> Result<Response, PageError> {
+    if fields.previews() {
+        let (joint_angle_preview, refused) = or_refused(previewed_joint_angles(&mut app, &fields).await)?;
+        let forms = Forms { joint_angles: fields, open: "joint_angles", joint_angle_preview, ..Forms::default() };
+        return show_preview(&mut app, id, &authorized, forms, refused).await;
+    }
     let kept = async {
         let checked = fields.read()?.checked(app.store_mut()).await?;
         keep(&app, &authorized, id, checked).await
@@ -66,17 +66,41 @@ pub(super) async fn joint_angles(
     .await
 }
 
+/// A preview, or why the file cannot be read.
+fn or_refused<T>(previewed: Result<T, Error>) -> Result<(Option<T>, Option<String>), PageError> {
+    match previewed {
+        Ok(preview) => Ok((Some(preview), None)),
+        Err(error @ Error::Invalid(_)) => Ok((None, Some(form_errors::in_words(&error)))),
+        Err(other) => Err(other.into()),
+    }
+}
+
+async fn show_preview(
+    app: &mut AppState,
+    id: LabSessionId,
+    authorized: &Authorized<Run>,
+    forms: Forms,
+    refused: Option<String>,
+) -> Result<Response, PageError> {
+    let status = if refused.is_some() { StatusCode::UNPROCESSABLE_ENTITY } else { StatusCode::OK };
+    Ok((status, lab::show(app, id, &authorized.caller, forms, refused).await?).into_response())
+}
+
 /// Reads and draws the file of the form on the thread pool. Nothing is stored.
-async fn previewed(app: &mut AppState, fields: &EmgFields) -> Result<MeasurementPreview, Error> {
+async fn previewed_emg(app: &mut AppState, fields: &EmgFields) -> Result<PreviewedEmg, Error> {
     let new = fields.read()?;
     let draw = move |_: &OnPool| {
         let preview = new.preview()?;
-        let charts = lab_charts::preview(&preview).iter().map(PageChart::new).collect();
-        let EmgPreview { columns, strides, refused, .. } = preview;
-        let refused = refused.as_ref().map(form_errors::in_words);
-        Ok::<_, Error>(MeasurementPreview { columns, channels: lab_charts::muscles(), charts, strides, refused })
+        let recording = RecordingPreview::of_emg(&preview);
+        Ok::<_, Error>(PreviewedEmg { columns: preview.columns, channels: lab_charts::muscles(), recording })
     };
     app.compute(draw).await?
+}
+
+/// Reads and draws the file of the form on the thread pool. Nothing is stored.
+async fn previewed_joint_angles(app: &mut AppState, fields: &JointAngleFields) -> Result<RecordingPreview, Error> {
+    let new = fields.read()?;
+    app.compute(move |_: &OnPool| Ok(RecordingPreview::of_joint_angles(&new.preview()?))).await?
 }
 
 async fn keep(

@@ -1,11 +1,9 @@
 //! The forms of a lab session for measurement files and filter settings, as typed, and their parsed values.
 
-use super::page_chart::PageChart;
+use super::recording_preview::RecordingPreview;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{
-    EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles, Stride,
-};
+use gaitwright_service::studies::lab::{EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles};
 use gaitwright_service::studies::reference_import::Unit;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -162,17 +160,24 @@ pub(super) struct JointAngleFields {
     pub(super) unit: String,
     pub(super) cutoff_hz: String,
     pub(super) file_name: String,
+    /// `preview`, or else an upload.
+    pub(super) button: String,
 }
 
 impl Default for JointAngleFields {
     fn default() -> Self {
         let JointAngleReading { format, cutoff_hz, .. } = JointAngleReading::default();
-        let (recording, unit) = (String::new(), String::new());
-        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string(), file_name: String::new() }
+        let [recording, unit, file_name, button] = std::array::from_fn(|_| String::new());
+        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string(), file_name, button }
     }
 }
 
 impl JointAngleFields {
+    /// Whether the form asks for a preview only.
+    pub(super) fn previews(&self) -> bool {
+        self.button == "preview"
+    }
+
     pub(super) fn read(&self) -> Result<NewJointAngles, Error> {
         let unit = match self.unit.as_str() {
             "" => None,
@@ -228,17 +233,16 @@ pub(super) struct Forms {
     /// The refused form: `emg`, `joint_angles` or `filters`.
     pub(super) open: &'static str,
     /// The preview of the EMG recording in the form.
-    pub(super) preview: Option<MeasurementPreview>,
+    pub(super) preview: Option<PreviewedEmg>,
+    /// The preview of the joint angles in the form.
+    pub(super) joint_angle_preview: Option<RecordingPreview>,
 }
 
 /// A preview of an EMG recording, as the page shows it.
 #[derive(Debug)]
-pub(super) struct MeasurementPreview {
+pub(super) struct PreviewedEmg {
     pub(super) columns: Vec<String>,
     /// Each channel and its muscle.
     pub(super) channels: [(&'static str, &'static str); 6],
-    pub(super) charts: Vec<PageChart>,
-    pub(super) strides: Vec<Stride>,
-    /// Why the file would be refused.
-    pub(super) refused: Option<String>,
+    pub(super) recording: RecordingPreview,
 }

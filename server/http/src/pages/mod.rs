@@ -29,6 +29,7 @@ mod page_chart;
 mod problem_types;
 mod rate;
 mod reached_bounds;
+mod recording_preview;
 mod reference_gaits;
 mod safety_review;
 mod saved;

@@ -1,6 +1,7 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::page_chart::{PageChart, shared_legend};
+use super::page_chart::PageChart;
+use super::recording_preview::RecordingPreview;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -14,8 +15,7 @@ use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
-use gait_optimizer::reference::RecordedStride;
-use gaitwright_charts::gait_charts;
+use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
@@ -90,31 +90,7 @@ struct ReferenceGaitsPage {
     fields: ReferenceGaitFields,
     refused: Option<FieldError>,
     /// The preview of the recording in the form.
-    preview: Option<JointAnglePreview>,
-}
-
-/// A preview of a recording, as the page shows it.
-struct JointAnglePreview {
-    charts: Vec<PageChart>,
-    /// The legend of these charts.
-    legend: Vec<(String, String)>,
-    strides: Vec<RecordedStride>,
-    /// The mean stride.
-    mean: Vec<PageChart>,
-    /// Why the recording would be refused.
-    refused: Option<String>,
-}
-
-impl JointAnglePreview {
-    fn of(new: &NewReferenceGait) -> Result<Self, Error> {
-        let preview = new.preview()?;
-        let mut charts: Vec<PageChart> = reference_figures::preview(&preview).iter().map(PageChart::new).collect();
-        let (mean, refused) = match &preview.reference {
-            Ok(found) => (gait_charts::of_reference(found).iter().map(PageChart::new).collect(), None),
-            Err(error) => (Vec::new(), Some(form_errors::in_words(error))),
-        };
-        Ok(Self { legend: shared_legend(&mut charts), charts, strides: preview.strides, mean, refused })
-    }
+    preview: Option<RecordingPreview>,
 }
 
 impl ReferenceGaitsPage {
@@ -178,7 +154,10 @@ pub(super) async fn import(
 ) -> Result<Response, PageError> {
     if fields.button == "preview" {
         let preview = match fields.read() {
-            Ok(new) => app.compute(move |_| JointAnglePreview::of(&new)).await.map_err(Error::from)?,
+            Ok(new) => {
+                let of = move |_: &OnPool| Ok(RecordingPreview::of_reference(&new.preview()?));
+                app.compute(of).await.map_err(Error::from)?
+            }
             Err(error) => Err(error),
         };
         let (status, preview, refused) = match preview {

@@ -14,6 +14,7 @@ use gaitwright_store::{Store, StoreResult, StudyId, TrialId, cancelled_jobs, cer
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
+use tokio_util::sync::CancellationToken;
 
 /// Certifies one gait.
 pub(super) struct Certifier {
@@ -74,7 +75,7 @@ impl TrialJob for Certifier {
     }
 
     /// A malformed gait gets a failed certificate that says why.
-    async fn carry_out(&self, trial: TrialId, (): ()) -> Result<(), Error> {
+    async fn carry_out(&self, trial: TrialId, (): (), _: CancellationToken) -> Result<(), Error> {
         certification::run(&mut self.store.clone(), &Actor::program(), trial, &self.certify).await
     }
 }

@@ -6,12 +6,14 @@ use super::trial_jobs::{TrialJob, run_cancellable};
 use super::trial_queue::TrialJobState;
 use crate::error::Error;
 use crate::workers::Explain;
+use gait_optimizer::CancelToken;
 use gaitwright_store::accessible_studies::Reach;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, cancelled_jobs, commit, events, explanations, trials};
 use serde_json::json;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
+use tokio_util::sync::CancellationToken;
 
 /// Explains one trial.
 pub(super) struct Explainer {
@@ -67,6 +69,7 @@ impl Explainer {
 impl TrialJob for Explainer {
     const NAME: &'static str = "explanation";
     const READS_REQUESTS: bool = true;
+    const KEEPS_PARTS: bool = true;
     type Request = ();
 
     async fn requested(&self) -> StoreResult<Vec<(TrialId, ())>> {
@@ -83,16 +86,21 @@ impl TrialJob for Explainer {
         Ok(trial.map(|trial| (trial, ())))
     }
 
-    async fn carry_out(&self, trial: TrialId, (): ()) -> Result<(), Error> {
+    async fn carry_out(&self, trial: TrialId, (): (), cancelled: CancellationToken) -> Result<(), Error> {
         let since = Instant::now();
         let mut store = self.store.clone();
         let packed = explanation::unexplained(&mut *store.read().await?, trial).await?;
         let (solve, problem) = store.compute(move |pool| packed.unpack(pool)).await??;
         let explain = Arc::clone(&self.explain);
-        let found = run_cancellable("explainer", move |cancel| explain.explain(&solve, cancel)).await??;
-        let nothing = || Error::Internal("the explanation ended without a result".to_owned());
-        explanation::record(&self.store, trial, &problem, &found.ok_or_else(nothing)?).await?;
-        self.durations.lock().unwrap_or_else(PoisonError::into_inner).add(since.elapsed().as_secs());
+        let work = move |cancel: &CancelToken| explain.explain(&solve, cancel);
+        let Some(found) = run_cancellable("explainer", &cancelled, work).await?? else {
+            let nothing = || Error::Internal("the explanation ended without a result".to_owned());
+            return if cancelled.is_cancelled() { Ok(()) } else { Err(nothing()) };
+        };
+        explanation::record(&self.store, trial, &problem, &found).await?;
+        if !found.stopped_early {
+            self.durations.lock().unwrap_or_else(PoisonError::into_inner).add(since.elapsed().as_secs());
+        }
         Ok(())
     }
 

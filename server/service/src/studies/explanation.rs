@@ -16,7 +16,7 @@ use serde_json::json;
 /// The state of the explanation of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ExplanationState {
-    /// The explanation is on record.
+    /// The explanation is on record, complete or stopped early.
     Made(Box<StoredExplanation>),
     /// The explanation is being computed or was requested.
     BeingMade,
@@ -57,13 +57,16 @@ pub struct Elapsed {
 /// # Errors
 /// Errors of the database.
 pub async fn state(db: &mut Connection, trial: &Trial, effort: ExplanationEffort) -> Result<ExplanationState, Error> {
-    if let Some(made) = explanations::find(db, trial.id).await? {
-        return Ok(ExplanationState::Made(Box::new(made)));
-    }
+    let found = explanations::find(db, trial.id).await?.map(Box::new);
+    let is_complete = |made: &StoredExplanation| !made.explanation.stopped_early;
+    let stopped = match found {
+        Some(made) if is_complete(&made) => return Ok(ExplanationState::Made(made)),
+        stopped => stopped.map_or(ExplanationState::NotAsked, ExplanationState::Made),
+    };
     let ready = match effort {
         ExplanationEffort::Refused(reason) => return Ok(ExplanationState::Refused(reason)),
         ExplanationEffort::Running(_) => return Ok(ExplanationState::BeingMade),
-        ExplanationEffort::Cancelled => return Ok(ExplanationState::NotAsked),
+        ExplanationEffort::Cancelled => return Ok(stopped),
         ExplanationEffort::Ready => true,
         ExplanationEffort::None => false,
     };
@@ -71,16 +74,16 @@ pub async fn state(db: &mut Connection, trial: &Trial, effort: ExplanationEffort
         return Ok(ExplanationState::BeingMade);
     }
     if !ready || !studies::get(db, trial.study_id).await?.state.has_ended() {
-        return Ok(ExplanationState::NotAsked);
+        return Ok(stopped);
     }
     match explainable(db, trial).await {
         Ok(_) => Ok(ExplanationState::Waiting),
-        Err(Error::Conflict(_)) => Ok(ExplanationState::NotAsked),
+        Err(Error::Conflict(_)) => Ok(stopped),
         Err(error) => Err(error),
     }
 }
 
-/// Requests the explanation of a trial. Returns whether it exists already.
+/// Requests the explanation of a trial. Returns whether a complete one exists already.
 ///
 /// # Errors
 /// [`Error::Conflict`] if the trial cannot be explained or the subject withdrew consent, [`Error::NotFound`], errors of
@@ -89,10 +92,10 @@ pub async fn ask(writer: &mut Writer, actor: &Actor, id: TrialId, effort: Explan
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     match state(writer, &trial, effort).await? {
-        ExplanationState::Made(_) => Ok(true),
+        ExplanationState::Made(made) if !made.explanation.stopped_early => Ok(true),
         ExplanationState::BeingMade => Ok(false),
         ExplanationState::Refused(reason) => Err(refusal(&trial, &reason)),
-        ExplanationState::Waiting | ExplanationState::NotAsked => {
+        ExplanationState::Made(_) | ExplanationState::Waiting | ExplanationState::NotAsked => {
             explainable(writer, &trial).await?;
             explanations::request(writer, id, actor).await?;
             audit::append(writer, actor, explanations::REQUESTED, &format!("trial {id}"), &json!({})).await?;

@@ -14,6 +14,7 @@ use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 use tokio::sync::{Notify, watch};
+use tokio_util::sync::CancellationToken;
 
 /// A kind of job: where its requests are on record, and what it does for one trial.
 pub(super) trait TrialJob: Send + Sync {
@@ -24,6 +25,8 @@ pub(super) trait TrialJob: Send + Sync {
     /// Whether [`Self::requested`] is read with every change of the record. If not, it is read once, and
     /// [`TrialJobs::ask`] announces later requests.
     const READS_REQUESTS: bool = false;
+    /// Whether [`Self::carry_out`] ends by itself soon after it was cancelled, and keeps what it has found.
+    const KEEPS_PARTS: bool = false;
     /// The parameters of a request, without the trial.
     type Request: Clone + Send + Sync;
 
@@ -49,7 +52,12 @@ pub(super) trait TrialJob: Send + Sync {
     }
 
     /// Does the work for a trial and stores the result. Dropping the future stops the work.
-    fn carry_out(&self, trial: TrialId, request: Self::Request) -> impl Future<Output = Result<(), Error>> + Send;
+    fn carry_out(
+        &self,
+        trial: TrialId,
+        request: Self::Request,
+        cancelled: CancellationToken,
+    ) -> impl Future<Output = Result<(), Error>> + Send;
 
     /// Records that the work for a trial is impossible.
     fn record_failure(&self, trial: TrialId, reason: &str) -> impl Future<Output = Result<(), Error>> + Send {
@@ -217,14 +225,14 @@ impl<J: TrialJob> TrialJobs<J> {
     async fn carry_out(&self, running: RunningJob<J::Request>, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
         let RunningJob { trial, request, cancelled, .. } = running;
         let study = trials::get(&mut *self.store.read().await?, trial).await?.study_id;
-        let mut work = std::pin::pin!(self.job.carry_out(trial, request));
+        let mut work = std::pin::pin!(self.job.carry_out(trial, request, cancelled.clone()));
         let result = loop {
             if consents::is_withdrawn(&mut *self.store.read().await?, study).await? {
                 return Ok(());
             }
             tokio::select! {
                 biased;
-                () = cancelled.cancelled() => return Ok(()),
+                () = cancelled.cancelled(), if !J::KEEPS_PARTS => return Ok(()),
                 result = &mut work => break result,
                 Ok(()) = pulse.changed() => {}
             }
@@ -248,19 +256,28 @@ impl<J: TrialJob> fmt::Debug for TrialJobs<J> {
     }
 }
 
-/// Runs work on a thread with lower priority than solves. Dropping the future cancels the token of the work.
+/// Runs work on a thread with lower priority than solves. The token of the work is cancelled with the job, or if the future is
+/// dropped.
 ///
 /// # Errors
 /// [`Error::Internal`] if no thread can be started or the work panics.
 pub(super) async fn run_cancellable<T: Send + 'static>(
     name: &'static str,
+    cancelled: &CancellationToken,
     work: impl FnOnce(&CancelToken) -> T + Send + 'static,
 ) -> Result<T, Error> {
     let cancel = CancelToken::new();
-    let (_cancels, of_thread) = (CancelOnDrop(cancel.clone()), cancel);
-    let result = run_below_solves(name, move || work(&of_thread))
+    let (_cancels, of_thread) = (CancelOnDrop(cancel.clone()), cancel.clone());
+    let mut result = run_below_solves(name, move || work(&of_thread))
         .map_err(|error| Error::Internal(format!("cannot start a thread for the {name}: {error}")))?;
-    result.await.map_err(|_| Error::Internal(format!("the {name} panicked")))
+    let result = tokio::select! {
+        result = &mut result => result,
+        () = cancelled.cancelled() => {
+            cancel.cancel();
+            result.await
+        }
+    };
+    result.map_err(|_| Error::Internal(format!("the {name} panicked")))
 }
 
 /// Cancels work when the caller stops waiting for it.

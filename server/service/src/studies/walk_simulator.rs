@@ -8,6 +8,7 @@ use gait_optimizer::execution::simulate;
 use gaitwright_store::{Store, StoreResult, TrialId, cancelled_jobs, execution_reports};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use tokio_util::sync::CancellationToken;
 
 /// Simulates the walks of one gait.
 pub(super) struct WalkSimulator {
@@ -52,12 +53,19 @@ impl TrialJob for WalkSimulator {
     }
 
     /// The simulation ends within one walk after the future was dropped.
-    async fn carry_out(&self, trial: TrialId, Request { asked, done }: Request) -> Result<(), Error> {
+    async fn carry_out(
+        &self,
+        trial: TrialId,
+        Request { asked, done }: Request,
+        cancelled: CancellationToken,
+    ) -> Result<(), Error> {
         let options = asked.options()?;
         let mut store = self.store.clone();
         let gait = execution::gait_of(&mut *store.read().await?, trial).await?;
         let gait = store.compute(move |pool| gait.unpack(pool)).await??;
-        match run_cancellable("walk simulator", move |cancel| simulate(&gait, &options, &done, cancel)).await?? {
+        match run_cancellable("walk simulator", &cancelled, move |cancel| simulate(&gait, &options, &done, cancel))
+            .await??
+        {
             Some(report) => execution::record(&self.store, trial, asked, report).await,
             None => Ok(()),
         }

@@ -33,7 +33,7 @@ pub const TABLES: &[Sealed] = &[
     sealed("attempts", &["trial_id", "attempt"]),
     sealed("certificates", &["trial_id", "format_version"]),
     sealed("explanation_requests", &["trial_id"]),
-    sealed("explanations", &["trial_id"]),
+    sealed("explanations", &["trial_id", "created_at"]),
     sealed("feedback", &["seq"]),
     sealed("feedback_retractions", &["feedback_seq"]),
     sealed("blind_pairs", &["id"]),

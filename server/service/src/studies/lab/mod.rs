@@ -8,6 +8,7 @@
 mod emg_preview;
 mod emg_reading;
 mod file_format;
+mod joint_angle_preview;
 mod lab_answer;
 mod measurement_results;
 mod question;
@@ -21,6 +22,7 @@ pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use emg_reading::EmgReading;
 pub use file_format::MeasurementFormat;
+pub use joint_angle_preview::JointAnglePreview;
 pub use lab_answer::{NewAnswer, give as answer, retract};
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,

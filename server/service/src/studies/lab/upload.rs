@@ -64,7 +64,7 @@ impl JointAngleReading {
         })
     }
 
-    fn joints(&self, text: &str) -> Result<JointRecording, Error> {
+    pub(super) fn joints(&self, text: &str) -> Result<JointRecording, Error> {
         Ok(match self.format {
             MeasurementFormat::Csv => JointRecording::from_csv(WHAT, text)?,
             MeasurementFormat::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
@@ -72,7 +72,7 @@ impl JointAngleReading {
     }
 
     /// Checks that a file gives a limit cycle and phase portraits with these settings.
-    fn check(&self, text: &str) -> Result<(), Error> {
+    pub(super) fn check(&self, text: &str) -> Result<(), Error> {
         check_file_name(self.file_name.as_deref())?;
         self.joints(text)?.check_walking(WHAT)?;
         self.portraits(text).map(|_| ())

@@ -1,0 +1,113 @@
+//! The preview of a recording before it is stored, which the forms for EMG, joint angles and reference gaits share: its signals
+//! with right heel strikes, its strides, and whether it would be accepted.
+
+use super::page_chart::{PageChart, shared_legend};
+use crate::figures::recording_traces::{StrideSpan, trace};
+use crate::figures::{lab_charts, reference_figures};
+use crate::form_errors;
+use gaitwright_charts::{Chart, gait_charts};
+use gaitwright_service::studies::lab::{EmgPreview, JointAnglePreview, Stride};
+use gaitwright_service::studies::reference_preview::ReferencePreview;
+
+/// A preview as the page shows it.
+#[derive(Debug)]
+pub(super) struct RecordingPreview {
+    /// Why the recording would be refused.
+    pub(super) refused: Option<String>,
+    /// The legend of the charts, if they share it.
+    pub(super) legend: Vec<(String, String)>,
+    pub(super) charts: Vec<PageChart>,
+    pub(super) strides: Vec<StrideRow>,
+    /// Whether strides can be rejected in the form.
+    pub(super) can_reject: bool,
+    /// The mean stride.
+    pub(super) mean: Vec<PageChart>,
+}
+
+/// A stride in the table.
+#[derive(Debug)]
+pub(super) struct StrideRow {
+    pub(super) number: usize,
+    pub(super) start_s: f64,
+    pub(super) duration_s: f64,
+    pub(super) usage: &'static str,
+}
+
+impl RecordingPreview {
+    fn new(charts: &[Chart], strides: &[StrideSpan], usage: impl Fn(usize) -> &'static str) -> Self {
+        let mut charts: Vec<PageChart> = charts.iter().map(PageChart::new).collect();
+        let row = |(place, stride): (usize, &StrideSpan)| StrideRow {
+            number: stride.number,
+            start_s: stride.start_s,
+            duration_s: stride.end_s - stride.start_s,
+            usage: usage(place),
+        };
+        Self {
+            refused: None,
+            legend: shared_legend(&mut charts),
+            charts,
+            strides: strides.iter().enumerate().map(row).collect(),
+            can_reject: false,
+            mean: Vec::new(),
+        }
+    }
+
+    /// An EMG recording.
+    pub(super) fn of_emg(preview: &EmgPreview) -> Self {
+        let left_out = |stride: &Stride| stride.rejected || !stride.is_plausible;
+        let span = |stride: &Stride| StrideSpan {
+            number: stride.number as usize,
+            start_s: stride.start_s,
+            end_s: stride.end_s,
+            left_out: left_out(stride),
+        };
+        let strides: Vec<StrideSpan> = preview.strides.iter().map(span).collect();
+        let charts: Vec<Chart> = preview
+            .traces
+            .iter()
+            .map(|channel| {
+                let title = format!("{}: column {}", lab_charts::muscle_name(channel.channel), channel.column);
+                let strikes: Vec<f64> = channel.at_strikes.iter().map(|(time, _)| *time).collect();
+                trace((&title, "raw signal", "raw signal"), &channel.points, &strikes, &strides)
+            })
+            .collect();
+        let usage = |place: usize| match preview.strides[place] {
+            Stride { rejected: true, .. } => "rejected",
+            Stride { is_plausible: false, .. } => "left out: too short or too long",
+            Stride { .. } => "used",
+        };
+        let refused = preview.refused.as_ref().map(form_errors::in_words);
+        Self { refused, can_reject: true, ..Self::new(&charts, &strides, usage) }
+    }
+
+    /// Joint angles of a walk in the lab.
+    pub(super) fn of_joint_angles(preview: &JointAnglePreview) -> Self {
+        let strides = reference_figures::stride_spans(&preview.strides);
+        let chart = |(joint, points): &(&str, Vec<(f64, f64)>)| {
+            trace((lab_charts::joint_name(joint), "angle, °", "recorded"), points, &preview.strikes_s, &strides)
+        };
+        let charts: Vec<Chart> = preview.traces.iter().map(chart).collect();
+        let usage = |place: usize| {
+            if preview.strides[place].is_used { "a stride" } else { "too short, too long, or with a gap" }
+        };
+        let refused = preview.refused.as_ref().map(form_errors::in_words);
+        Self { refused, ..Self::new(&charts, &strides, usage) }
+    }
+
+    /// A recording for a reference gait.
+    pub(super) fn of_reference(preview: &ReferencePreview) -> Self {
+        let strides = reference_figures::stride_spans(&preview.strides);
+        let charts = preview.traces.iter();
+        let charts: Vec<Chart> = charts
+            .map(|angles| trace((angles.joint, "angle, °", "recorded"), &angles.points, &preview.strikes_s, &strides))
+            .collect();
+        let usage = |place: usize| {
+            if preview.strides[place].is_used { "used" } else { "left out: too short, too long, or with a gap" }
+        };
+        let (mean, refused) = match &preview.reference {
+            Ok(found) => (gait_charts::of_reference(found).iter().map(PageChart::new).collect(), None),
+            Err(error) => (Vec::new(), Some(form_errors::in_words(error))),
+        };
+        Self { refused, mean, ..Self::new(&charts, &strides, usage) }
+    }
+}

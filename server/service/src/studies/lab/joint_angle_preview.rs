@@ -1,0 +1,97 @@
+//! A preview of a recording of joint angles before it is stored: its angles over time, and the strides between right heel
+//! strikes, which are found from the joint angles.
+
+use super::emg_preview::extremes;
+use super::file_format::WHAT;
+use super::upload::NewJointAngles;
+use crate::error::Error;
+use gait_optimizer::phase_portrait::JointRecording;
+use gait_optimizer::reference::{HeelStrikes, MotionRecording, RecordedStride};
+
+/// A preview of a recording of joint angles.
+#[derive(Debug)]
+pub struct JointAnglePreview {
+    /// Each recorded joint, one of [`gait_optimizer::phase_portrait::JOINTS`], with the smallest and the largest angle, °, of
+    /// intervals over the time since the start, s.
+    pub traces: Vec<(&'static str, Vec<(f64, f64)>)>,
+    /// Right heel strikes, s; empty without the angles of torso, right hip and right knee.
+    pub strikes_s: Vec<f64>,
+    /// The strides between them.
+    pub strides: Vec<RecordedStride>,
+    /// Why the file would be refused as it is; `None` if it would be accepted.
+    pub refused: Option<Error>,
+}
+
+impl NewJointAngles {
+    /// Reads the file and previews it. What is missing for an upload is said in [`JointAnglePreview::refused`].
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column if the file cannot be read.
+    pub fn preview(&self) -> Result<JointAnglePreview, Error> {
+        let recording = self.reading.joints(&self.recording)?;
+        let trace = |(joint, angles): &(&'static str, Vec<f64>)| {
+            let point = |(sample, angle): (usize, f64)| (sample as f64 / recording.rate_hz, angle.to_degrees());
+            (*joint, extremes(angles).into_iter().map(point).collect())
+        };
+        let (strikes_s, strides) = strides(&recording).unwrap_or_default();
+        let refused = self.reading.check(&self.recording).err();
+        Ok(JointAnglePreview { traces: recording.joints.iter().map(trace).collect(), strikes_s, strides, refused })
+    }
+}
+
+/// Right heel strikes and the strides between them.
+fn strides(recording: &JointRecording) -> Option<(Vec<f64>, Vec<RecordedStride>)> {
+    let joint = |name: &str| recording.joints.iter().find(|(known, _)| *known == name).map(|(_, angles)| angles);
+    let (torso, hip, knee) = (joint("torso")?, joint("hip_R")?, joint("knee_R")?);
+    let motion = MotionRecording {
+        what: WHAT.to_owned(),
+        time_s: (0..knee.len()).map(|sample| sample as f64 / recording.rate_hz).collect(),
+        // The position of the right heel does not depend on the left leg.
+        angles_rad: torso.iter().zip(hip).map(|(torso, hip)| [*torso, 0.0, 0.0, 0.0, *hip]).collect(),
+        knee_r_rad: Some(knee.clone()),
+        right_force: None,
+        steps: Vec::new(),
+    };
+    let strikes = motion.heel_strikes(&HeelStrikes::Kinematics).ok()?;
+    let strides = motion.strides(&strikes);
+    Some((strikes, strides))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::studies::lab::JointAngleReading;
+    use std::fmt::Write;
+
+    /// Twelve seconds of a leg that swings once in 1.2 s.
+    fn recording(columns: &str) -> NewJointAngles {
+        let mut text = format!("time_s,{columns}\n");
+        for sample in 0..1200 {
+            let time = f64::from(sample) / 100.0;
+            let phase = std::f64::consts::TAU * time / 1.2;
+            write!(text, "{time}").unwrap();
+            for column in columns.split(',') {
+                let angle = if column == "torso_rad" { 0.02 * phase.sin() } else { 0.4 * phase.cos() };
+                write!(text, ",{angle}").unwrap();
+            }
+            text.push('\n');
+        }
+        NewJointAngles { walk: 1, recording: text, reading: JointAngleReading::default() }
+    }
+
+    #[test]
+    fn preview_has_traces_and_heel_strikes_found_from_the_angles() {
+        let shown = recording("torso_rad,hip_R_rad,knee_R_rad").preview().unwrap();
+        assert!(shown.refused.is_none(), "{:?}", shown.refused);
+        assert_eq!(shown.traces.iter().map(|(joint, _)| *joint).collect::<Vec<_>>(), ["torso", "hip_R", "knee_R"]);
+        assert!(shown.strikes_s.len() >= 8, "{:?}", shown.strikes_s);
+        assert!(shown.strides.iter().all(|stride| (stride.end_s - stride.start_s - 1.2).abs() < 0.03));
+    }
+
+    #[test]
+    fn preview_without_the_right_leg_has_traces_only() {
+        let shown = recording("hip_L_rad").preview().unwrap();
+        assert!(shown.strikes_s.is_empty() && shown.strides.is_empty() && shown.traces.len() == 1);
+    }
+}
