@@ -3,7 +3,7 @@
 //! `attempts` is a fencing token: a result counts only if it has the number of the current attempt and the job is still
 //! leased. Late and repeated results are therefore never recorded twice.
 
-use super::members::{reach_values, reached};
+use super::accessible_studies::{reach_values, reached};
 use super::{Connection, Instant, SolveJobId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
 use sqlx::Row;

@@ -15,7 +15,7 @@ use gaitwright_store::audit;
 use gaitwright_store::solve_jobs::{self, OpenSolve};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
-    Connection, StudyId, TrialId, Writer, cancelled_jobs, certificates, explanations, members, trials,
+    Connection, StudyId, TrialId, Writer, accessible_studies, cancelled_jobs, certificates, explanations, trials,
 };
 use serde_json::json;
 
@@ -143,7 +143,7 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
         .collect();
     for (id, trial, state) in runners.scheduler.jobs_after_solves() {
         let study = trials::get(db, trial).await?.study_id;
-        if members::reaches(db, reach, study).await? {
+        if accessible_studies::reaches(db, reach, study).await? {
             all.push(status(id, Some(study), state, None));
         }
     }
