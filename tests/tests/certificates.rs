@@ -360,8 +360,10 @@ async fn sensitivities_of_a_mesh_above_80_intervals_are_refused() {
             "an analytic gait has no solution of its mesh: {}",
             answer.text
         );
-        let reason =
-            format!("The mesh of trial 1 has {} intervals. The service computes sensitivities up to 80;", 60 + ss1);
+        let reason = format!(
+            "The mesh of trial 1 has {} intervals. The service computes sensitivities for at most 80 intervals;",
+            60 + ss1
+        );
         assert_eq!(answer.text.contains(&reason), refused, "{}", answer.text);
     }
     service.stop().await;

@@ -283,7 +283,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     (
         "a preference from nowhere",
         |r| of_source(r, "clinician")["source"] = "evaluation".into(),
-        "a preference cannot have the source evaluation",
+        "the source of a preference cannot be evaluation",
     ),
     (
         "an answer by a name with spaces around it",

@@ -79,7 +79,7 @@ impl ShownReport {
         let values = vec![
             ("Strides without any disturbance", of_strides(report.undisturbed_strides)),
             ("Strides on harder and softer ground, otherwise undisturbed", by_yield.join(", ")),
-            ("Largest push at the hip survived without other disturbances", pushes(&report)),
+            ("Largest push at the hip that the walker survives without other disturbances", pushes(&report)),
             (
                 "Disturbed simulated walks",
                 format!("{simulated_walks} on each ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"),

@@ -223,7 +223,7 @@ fn checked(study: &Study, tell: &TellRequest) -> Result<ReportedResult, Error> {
         }
     }
     if tell.label == Label::NotConverged && reason.is_empty() {
-        return Err(Error::invalid("reason", "", "1 to 2000 characters, the reason why no gait was found"));
+        return Err(Error::invalid("reason", "", "1 to 2000 characters long and say why no gait was found"));
     }
     let converged = tell.label == Label::Converged;
     let answered_by_rmse = study.plan.answer_source != AnswerSource::People;
