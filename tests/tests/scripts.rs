@@ -233,7 +233,7 @@ async fn study_ends_by_solve_time_or_unchanged_best_action() {
     let settled = service.wait_for(settled, &[StudyState::Finished]).await;
     assert!(settled.state_reason.contains("has not changed over the last 6 results"), "{}", settled.state_reason);
     let timed = service.wait_for(timed, &[StudyState::Finished]).await;
-    assert!(timed.state_reason.contains("of the 1 s"), "{}", timed.state_reason);
+    assert!(timed.state_reason.contains("the limit is 1 s"), "{}", timed.state_reason);
     let trials = service.trials(timed.id).await.len();
     assert!((100..=101).contains(&trials), "{trials}");
     service.stop().await;
