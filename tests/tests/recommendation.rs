@@ -66,13 +66,10 @@ async fn recommendation_of_a_study_with_many_answers_does_not_wait_for_the_poste
             assert_eq!(service.fetch(path).await.status, StatusCode::OK);
         }
         assert_eq!(service.scheduler.analyses().computed() > computed, waits);
-        let comparison =
-            format!("/api/v1/study-comparison?ids={study},{}", service.study(|new| new.start = false).await);
         let newest = service.trials(study).await.pop().unwrap();
         if !waits {
             let best = json!(newest.best_before);
             assert_eq!(recommendation(&service, study).await["trial_id"], best, "the last known best trial");
-            assert_eq!(service.fetch(&comparison).await.status, StatusCode::OK);
             assert_eq!(service.scheduler.analyses().computed(), computed, "no posterior was computed");
         }
         service.stop().await;

@@ -153,7 +153,7 @@ mod tests {
     /// Subjects of the record that is migrated.
     const SUBJECTS: u32 = 400;
     /// How often the migration is killed.
-    const KILLS: u32 = 24;
+    const KILLS: u32 = 12;
     /// Names the record to the child process of the test, which migrates it.
     const CHILD: &str = "GAITWRIGHT_TEST_MIGRATES";
 
