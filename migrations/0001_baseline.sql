@@ -317,26 +317,26 @@ when new.state in ('queued', 'running')
     and (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
 begin select raise(abort, 'the subject withdrew consent'); end;
 
--- The solves of trials in the queue of workers.
-create table jobs (
+-- The jobs that solve trials, in the queue of workers. Other jobs are known by what they write and by the audit trail.
+create table solve_jobs (
     id          text primary key not null,
-    trial_id    text not null constraint jobs_trial_unique unique references trials (id),
-    state       text not null constraint jobs_state check (state in ('queued', 'leased', 'done')),
+    trial_id    text not null constraint solve_jobs_trial_unique unique references trials (id),
+    state       text not null constraint solve_jobs_state check (state in ('queued', 'leased', 'done')),
     -- Number of attempts so far. A result with another number belongs to an attempt that has ended.
-    attempts    integer not null default 0 constraint jobs_attempts check (attempts >= 0),
+    attempts    integer not null default 0 constraint solve_jobs_attempts check (attempts >= 0),
     -- Number of attempts that ended with a panic or an error of the program.
-    failures    integer not null default 0 constraint jobs_failures check (failures >= 0),
+    failures    integer not null default 0 constraint solve_jobs_failures check (failures >= 0),
     -- Number of attempts whose worker stopped responding.
-    losses      integer not null default 0 constraint jobs_losses check (losses >= 0),
+    losses      integer not null default 0 constraint solve_jobs_losses check (losses >= 0),
     worker      text,
     lease_until text,
     created_at  text not null,
-    constraint jobs_lease_complete check (
+    constraint solve_jobs_lease_complete check (
         (state = 'leased') = (lease_until is not null) and (state = 'leased') = (worker is not null)
     )
 ) strict;
 
-create index jobs_by_state on jobs (state, created_at);
+create index solve_jobs_by_state on solve_jobs (state, created_at);
 
 -- Results of attempts, including those that arrived too late.
 create table attempts (
@@ -445,21 +445,21 @@ create table feedback (
     trial_a    text not null references trials (id),
     -- preference: the loser. no_difference: the other trial.
     trial_b    text references trials (id),
-    -- label: the ordinal category; 0 is not converged.
-    category   integer,
+    -- label: whether the evaluation of the trial found a gait.
+    label      text constraint feedback_label check (label in ('converged', 'not_converged')),
     -- suggestion: the index of the suggested action in the search space.
     suggested  integer,
     source     text not null
                constraint feedback_source
-               check (source in ('convergence', 'gait_rmse', 'subject', 'clinician', 'script')),
+               check (source in ('evaluation', 'gait_rmse', 'subject', 'clinician', 'script')),
     author     text not null constraint feedback_author_length check (length(author) between 1 and 80),
     note       text not null default '' constraint feedback_note_length check (length(note) <= 2000),
     created_at text not null,
     constraint feedback_shape check (
         case kind
-            when 'label' then trial_b is null and category is not null and suggested is null
-            when 'suggestion' then trial_b is null and category is null and suggested is not null
-            else trial_b is not null and category is null and suggested is null
+            when 'label' then trial_b is null and label is not null and suggested is null
+            when 'suggestion' then trial_b is null and label is null and suggested is not null
+            else trial_b is not null and label is null and suggested is null
         end
     ),
     constraint feedback_two_trials check (trial_b is null or trial_a <> trial_b)

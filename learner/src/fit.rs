@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::inference::{Approximate, Approximation};
+use crate::interval_likelihood::Link;
 use crate::kernel::Kernel;
-use crate::likelihood::Link;
 use crate::observations::{Observation, ObservedPoints};
 use crate::search_space::SearchSpace;
 

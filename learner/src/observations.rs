@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use crate::action::ActionIndex;
 use crate::error::Result;
+use crate::interval_likelihood::Interval;
 use crate::kernel::Kernel;
-use crate::likelihood::Interval;
 use crate::linalg::Cholesky;
 use crate::search_space::SearchSpace;
 

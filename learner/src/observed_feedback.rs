@@ -1,11 +1,9 @@
-//! What the feedback says of utility and feasibility: each label, preference, answer of no difference and suggestion as an
-//! observation.
+//! The feedback as observations of utility and feasibility.
 
 use std::collections::HashSet;
 
 use crate::action::ActionIndex;
 use crate::feedback::{Feedback, FeedbackLog};
-use crate::likelihood::Interval;
 use crate::observations::Observation;
 use crate::settings::{Labels, LearnerSettings};
 
@@ -15,7 +13,6 @@ pub(crate) fn observations(
     settings: &LearnerSettings,
     infeasible: &HashSet<ActionIndex>,
 ) -> [Vec<Observation>; 2] {
-    let above = |noise| Interval { low: 0.0, high: f64::INFINITY, noise };
     let mut split = [Vec::new(), Vec::new()];
     for &feedback in &log.feedback {
         let (plus, minus) = feedback.actions();
@@ -27,13 +24,9 @@ pub(crate) fn observations(
                 continue;
             }
             Feedback::Label { category, .. } => settings.label_interval(category),
-            Feedback::Preference { .. } => above(settings.preference_noise),
-            Feedback::Suggestion { .. } => above(settings.coactive_noise),
-            Feedback::NoDifference { .. } => Interval {
-                low: -settings.no_difference_width,
-                high: settings.no_difference_width,
-                noise: settings.no_difference_noise,
-            },
+            Feedback::Preference { .. } => settings.preference_interval(),
+            Feedback::Suggestion { .. } => settings.suggestion_interval(),
+            Feedback::NoDifference { .. } => settings.no_difference_interval(),
         };
         let decided = settings.labels == Labels::Separate
             && minus.is_some_and(|minus| infeasible.contains(&plus) != infeasible.contains(&minus));

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{LearnerError, Result};
-use crate::likelihood::{Interval, Link};
+use crate::interval_likelihood::Link;
 
 mod deserialize;
 
@@ -192,31 +192,6 @@ impl LearnerSettings {
                 ..polar
             },
             _ => polar,
-        }
-    }
-
-    /// The interval of utilities of a category.
-    pub(crate) fn label_interval(&self, category: usize) -> Interval {
-        let bounds = &self.ordinal_thresholds;
-        let low = category.checked_sub(1).and_then(|below| bounds.get(below)).copied().unwrap_or(f64::NEG_INFINITY);
-        Interval { low, high: bounds.get(category).copied().unwrap_or(f64::INFINITY), noise: self.ordinal_noise }
-    }
-
-    /// With separate labels, the interval of feasibility of a category: below or above the lowest threshold.
-    pub(crate) fn feasibility_interval(&self, category: usize) -> Interval {
-        let lowest = self.label_interval(0);
-        if category == 0 { lowest } else { Interval { low: lowest.high, high: f64::INFINITY, ..lowest } }
-    }
-
-    /// With separate labels, the interval of utilities of a category above 0. `None` if the category does not inform
-    /// the utility.
-    pub(crate) fn grade_interval(&self, category: usize) -> Option<Interval> {
-        let interval = self.label_interval(category);
-        match category {
-            0 => None,
-            _ if self.categories() < 3 => None,
-            1 => Some(Interval { low: f64::NEG_INFINITY, ..interval }),
-            _ => Some(interval),
         }
     }
 

@@ -11,7 +11,7 @@ mod simulation;
 mod table;
 
 use gait_learner::{LearnerSettings, Method};
-use problems::Problem;
+use problems::{Knowledge, Problem};
 use simulation::{Person, champion, run};
 use table::{DEFAULT_COLUMNS, Table};
 
@@ -25,7 +25,7 @@ fn mean_regret(name: &str, noise: f64, settings: Option<&LearnerSettings>) -> f6
         let problem = Problem::named(name, seed, None).unwrap();
         let person = Person::new(&problem, noise, seed);
         let regrets = match settings {
-            Some(settings) => run(person, settings, COMPARISONS, 1).unwrap(),
+            Some(settings) => run(person, settings, COMPARISONS, 1, Knowledge::default()).unwrap(),
             None => champion(person, COMPARISONS),
         };
         assert_eq!(regrets.len(), COMPARISONS + 1);
@@ -75,7 +75,7 @@ fn eubo_beats_random_search_on_the_gaits_of_an_atlas() {
             let last = |regrets: Vec<f64>| *regrets.last().unwrap();
             random += last(champion(Person::new(&problem, 0.0, seed), 10));
             let settings = LearnerSettings::of(Method::Eubo);
-            eubo += last(run(Person::new(&problem, 0.0, seed), &settings, 10, 1).unwrap());
+            eubo += last(run(Person::new(&problem, 0.0, seed), &settings, 10, 1, Knowledge::default()).unwrap());
         }
         assert!(eubo < random, "{name}: random {random} eubo {eubo}");
     }

@@ -100,7 +100,7 @@ fn row(name: &str, gait: Option<&Gait>) -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     let options = ExecutionOptions {
-        walks: argument("--walks", "200").parse()?,
+        simulated_walks: argument("--walks", "200").parse()?,
         threads: argument("--threads", "2").parse()?,
         ..ExecutionOptions::default()
     };

@@ -1,9 +1,11 @@
 //! Comparison of warm starts and cold starts after changes of bounds of Table I.
 //!
 //! `cargo run --release -p gait-optimizer --example warm_starts -- [--subject 1] [--muscles on] [--changes 20] [--seed
-//! 1] [--cold on] [--threads 1] [--at-once 1] [--from 20,90,0.3,1.4,0,0.5,50,40] [--values table|tight]` solves with
-//! the bounds `--from`, then for each random change of `--at-once` bounds from that gait and, with `--cold on`, cold.
-//! It prints one CSV row for each, and medians at the end. `--values tight` draws values far beyond Table I.
+//! 1] [--cold on] [--threads 1] [--at-once 1] [--from 20,90,0.3,1.4,0,0.5,50,40] [--values table|tight] [--active off]
+//! [--starts 1]` solves with the bounds `--from`, then for each random change of `--at-once` bounds from that gait and, with
+//! `--cold on`, cold. It prints one CSV row for each, and medians at the end. `--values tight` draws values far beyond Table I.
+//! `--active on` draws only values with which the gait would not stay as it is. With `--starts 25`, the changes are spread
+//! over as many gaits, of random actions of Table I, solved from the gait of `--from`.
 //!
 //! `warm_attempt` is the end of the warm start itself. `violation_stands` is its longest run of iterations in which the
 //! smallest violation did not decrease to 0.9 times its value; `residuals_stand` is the same for the largest of
@@ -17,7 +19,7 @@ mod tuned_actions;
 use arguments::argument;
 use gait_optimizer::{
     CancelToken, GaitProblem, IterationRecord, SolveOptions, SolveOutcome, SolvePhase, SolveStatus, Subject,
-    TunedBounds, WarmStart, solve,
+    TunedBounds, UnchangedBound, WarmStart, solve,
 };
 use median::median;
 use splitmix::SplitMix;
@@ -34,28 +36,51 @@ fn run(
     Ok(solve(problem, warm, &options, observer, &CancelToken::new())?)
 }
 
-/// The bounds with some distinct ones set to other values.
+/// Largest number of draws until a change is found.
+const DRAWS: usize = 10_000;
+
+/// The bounds with some distinct ones set to other values, none of which leaves the gait of `unchanged` as it is; `None` if
+/// there are too few.
 fn changed(
     from: TunedBounds,
     count: usize,
     values: &[&[f64]; TunedBounds::COUNT],
+    unchanged: &[UnchangedBound],
     random: &mut SplitMix,
-) -> (TunedBounds, String) {
-    loop {
+) -> Option<(TunedBounds, String)> {
+    for _ in 0..DRAWS {
         let mut action = from.to_array();
         let mut drawn = Vec::new();
-        while drawn.len() < count {
+        for _ in 0..DRAWS {
+            if drawn.len() == count {
+                break;
+            }
             let bound = random.below(TunedBounds::COUNT);
-            if drawn.contains(&bound) {
+            let stays = |value: f64| unchanged.get(bound).is_some_and(|unchanged| unchanged.contains(value));
+            let others: Vec<f64> =
+                values[bound].iter().copied().filter(|&v| v != from.to_array()[bound] && !stays(v)).collect();
+            if drawn.contains(&bound) || others.is_empty() {
                 continue;
             }
-            let others: Vec<f64> = values[bound].iter().copied().filter(|&v| v != action[bound]).collect();
             action[bound] = others[random.below(others.len())];
             drawn.push(bound);
         }
+        if drawn.len() < count {
+            return None;
+        }
         if let Ok(bounds) = TunedBounds::from_array(action) {
             let words = drawn.iter().map(|&bound| format!("{}={}", TunedBounds::NAMES[bound], action[bound]));
-            return (bounds, words.collect::<Vec<_>>().join(" "));
+            return Some((bounds, words.collect::<Vec<_>>().join(" ")));
+        }
+    }
+    None
+}
+
+fn random_bounds(random: &mut SplitMix) -> TunedBounds {
+    loop {
+        let action = LEVELS.map(|levels| levels[random.below(levels.len())]);
+        if let Ok(bounds) = TunedBounds::from_array(action) {
+            return bounds;
         }
     }
 }
@@ -83,6 +108,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !(1..=8).contains(&at_once) {
         return Err("--at-once: 1 to 8".into());
     }
+    let active = argument("--active", "off") == "on";
+    let starts: usize = argument("--starts", "1").parse()?;
     let values = match argument("--values", "table").as_str() {
         "table" => LEVELS,
         "tight" => TIGHT,
@@ -95,19 +122,32 @@ fn main() -> Result<(), Box<dyn Error>> {
         let action: Vec<f64> = from.split(',').map(str::parse).collect::<Result<_, _>>()?;
         base.bounds = TunedBounds::from_array(action.try_into().map_err(|_| "--from: one number for each bound")?)?;
     }
-    let start = run(&base, None, threads, &mut |_| {})?;
+    let root = run(&base, None, threads, &mut |_| {})?;
     eprintln!(
         "base: {:?} {} iterations {:.2} s",
-        start.report.status, start.report.iterations, start.report.seconds_total
+        root.report.status, root.report.iterations, root.report.seconds_total
     );
     println!(
         "change,warm_attempt,warm_attempt_iterations,violation_stands,residuals_stand,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse"
     );
     let (mut warm_seconds, mut warm_iterations) = (Vec::new(), Vec::new());
     let (mut cold_seconds, mut cold_iterations) = (Vec::new(), Vec::new());
-    let (mut worst_ratio, mut failed) = (0.0_f64, 0);
-    for _ in 0..changes {
-        let (bounds, words) = changed(base.bounds, at_once, &values, &mut random);
+    let (mut worst_ratio, mut failed, mut more_iterations, mut done) = (0.0_f64, 0, 0, 0);
+    let (mut here, mut start) = (base.clone(), root.clone());
+    while done < changes {
+        if starts > 1 && done % changes.div_ceil(starts) == 0 {
+            here.bounds = random_bounds(&mut random);
+            start = run(&here, Some(&root.warm_start), threads, &mut |_| {})?;
+        }
+        let unchanged = if active { &start.report.unchanged_bounds[..] } else { &[] };
+        let change = changed(here.bounds, at_once, &values, unchanged, &mut random);
+        let Some((bounds, words)) = change.filter(|_| start.report.status == SolveStatus::Converged) else {
+            if starts > 1 {
+                continue;
+            }
+            return Err("too few values change the gait".into());
+        };
+        done += 1;
         let problem = GaitProblem { bounds, ..base.clone() };
         let (mut iterations, mut own) = (Vec::new(), true);
         let warm = run(&problem, Some(&start.warm_start), threads, &mut |record| {
@@ -144,13 +184,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
             cold_seconds.push(cold.seconds_total);
             cold_iterations.push(cold.iterations as f64);
+            more_iterations += usize::from(warm.iterations > cold.iterations);
             worst_ratio = worst_ratio.max(warm.seconds_total / cold.seconds_total);
         } else {
             println!(",,,,,");
         }
     }
     eprintln!(
-        "median warm {} iterations {:.3} s ({} of {changes} converged, {failed} starts failed); median cold {} iterations {:.3} s; worst warm/cold {worst_ratio:.2}",
+        "median warm {} iterations {:.3} s ({} of {changes} converged, {failed} starts failed); median cold {} iterations {:.3} s; worst warm/cold {worst_ratio:.2}; {more_iterations} warm starts took more iterations than cold",
         median(&mut warm_iterations),
         median(&mut warm_seconds),
         warm_seconds.len(),

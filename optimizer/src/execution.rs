@@ -50,8 +50,8 @@ const STRIDES_BEFORE_PUSH: f64 = 3.2;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExecutionOptions {
-    /// Number of simulated walks on each ground, 1 to [`Self::MOST_WALKS`].
-    pub walks: u32,
+    /// Number of simulated walks on each ground, 1 to [`Self::MOST_SIMULATED_WALKS`].
+    pub simulated_walks: u32,
     /// Strides of a complete walk, 1 to 1000.
     pub strides: u32,
     /// Largest height and depth of the plateaus of each ground, m; 0 to [`Self::HIGHEST_GROUND_M`].
@@ -64,20 +64,20 @@ pub struct ExecutionOptions {
 
 impl Default for ExecutionOptions {
     fn default() -> Self {
-        Self { walks: 50, strides: 20, ground_heights_m: vec![0.0, 0.005, 0.01], seed: 1, threads: 1 }
+        Self { simulated_walks: 50, strides: 20, ground_heights_m: vec![0.0, 0.005, 0.01], seed: 1, threads: 1 }
     }
 }
 
 impl ExecutionOptions {
     /// Largest number of simulated walks on a ground.
-    pub const MOST_WALKS: u32 = 100_000;
+    pub const MOST_SIMULATED_WALKS: u32 = 100_000;
     /// Largest height and depth of the ground, m.
     pub const HIGHEST_GROUND_M: f64 = 0.05;
 
     /// Number of walks with random disturbances, over all grounds.
     pub fn random_walks(&self) -> u32 {
         let grounds = u32::try_from(self.ground_heights_m.len()).unwrap_or(u32::MAX);
-        self.walks.saturating_mul(grounds)
+        self.simulated_walks.saturating_mul(grounds)
     }
 
     /// Checks each option.
@@ -85,7 +85,12 @@ impl ExecutionOptions {
     /// # Errors
     /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
-        ModelError::check_range("walks", f64::from(self.walks), 1.0, f64::from(Self::MOST_WALKS))?;
+        ModelError::check_range(
+            "simulated_walks",
+            f64::from(self.simulated_walks),
+            1.0,
+            f64::from(Self::MOST_SIMULATED_WALKS),
+        )?;
         ModelError::check_range("strides", f64::from(self.strides), 1.0, 1e3)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 64.0)?;
         for height in &self.ground_heights_m {
@@ -122,7 +127,7 @@ pub fn simulate(
     };
     let mut grounds = Vec::new();
     for &ground_m in &options.ground_heights_m {
-        let outcomes = in_parallel(options.walks, options.threads, cancel, &|number| walk(ground_m, number))?;
+        let outcomes = in_parallel(options.simulated_walks, options.threads, cancel, &|number| walk(ground_m, number))?;
         if cancel.is_cancelled() {
             return Ok(None);
         }

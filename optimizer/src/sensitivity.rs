@@ -7,11 +7,12 @@
 
 mod active;
 mod bound_sensitivity;
-mod parameter;
+mod program_derivatives;
 mod result_derivatives;
 mod sensitivity_sentences;
 
 pub use active::ActiveConstraint;
+use bound_sensitivity::PointSensitivities;
 pub use bound_sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError};
 pub use result_derivatives::ResultDerivatives;
 
@@ -28,7 +29,7 @@ pub fn sensitivities(
     solution: &WarmStart,
     options: &SolveOptions,
 ) -> Result<GaitSensitivities, GaitSensitivityError> {
-    let points = parameter::PointSensitivities::new(problem, solution, options)?;
+    let points = PointSensitivities::new(problem, solution, options)?;
     let bounds = (0..TunedBounds::COUNT).map(|bound| points.of_bound(problem, solution, bound));
     Ok(GaitSensitivities { cost_of_transport: points.cost_of_transport(problem, solution), bounds: bounds.collect() })
 }

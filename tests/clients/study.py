@@ -14,7 +14,7 @@ from gaitwright_client.api.access import create_token
 from gaitwright_client.api.figures import get_study_figure
 from gaitwright_client.api.operation import get_job
 from gaitwright_client.api.preferences import create_preference, get_preference, list_preferences
-from gaitwright_client.api.scripts import ask_for_trial, tell_outcome
+from gaitwright_client.api.scripts import ask_for_trial, tell_result
 from gaitwright_client.api.studies import (
     create_study,
     get_recommendation,
@@ -36,13 +36,13 @@ from gaitwright_client.models import (
     AnswerSource,
     Job,
     JobState,
+    Label,
     MilestonePage,
     NewPreference,
     NewStudy,
     NewSubject,
     NewToken,
     NewTokenScopesItem,
-    Outcome,
     PairAnswer,
     Preference,
     PreferencePage,
@@ -117,11 +117,11 @@ def by_script(client: Client, subject: UUID) -> None:
         trial = given(Trial, asked.parsed)
         rmse = measure(trial.action)
         told = (
-            TellRequest(outcome=Outcome.NOT_CONVERGED, reason="the walker stumbled")
+            TellRequest(label=Label.NOT_CONVERGED, reason="the walker stumbled")
             if rmse is None
-            else TellRequest(outcome=Outcome.CONVERGED, gait_rmse_rad=rmse)
+            else TellRequest(label=Label.CONVERGED, gait_rmse_rad=rmse)
         )
-        given(Trial, tell_outcome.sync(trial.id, client=client, body=told))
+        given(Trial, tell_result.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)
     assert [trial.number for trial in trials] == list(range(1, TRIALS + 1)), trials
     best = given(MilestonePage, list_study_history.sync(study.id, client=client)).items[-1]

@@ -86,8 +86,8 @@ async function byScript(subject_id: string): Promise<void> {
     const rmse = measure(trial.action);
     const told =
       rmse === undefined
-        ? { outcome: "not_converged" as const, reason: "the walker stumbled" }
-        : { outcome: "converged" as const, gait_rmse_rad: rmse };
+        ? { label: "not_converged" as const, reason: "the walker stumbled" }
+        : { label: "converged" as const, gait_rmse_rad: rmse };
     given(await client.POST("/api/v1/trials/{id}/tell", { params: { path: { id: trial.id } }, body: told }));
   }
   const numbers = (await trialsOf(id)).map((trial) => trial.number);

@@ -53,8 +53,8 @@ pub async fn fill_to(database: &Path, study: StudyId, trials: u32) {
     .await
     .unwrap();
     sqlx::query(
-        "insert into feedback (id, study_id, kind, trial_a, category, source, author, created_at)
-         select printf('01890001-0000-7000-8%s-%012d', substr(study_id, 34, 3), number), study_id, 'label', id, 1, 'convergence', 'x', created_at from trials
+        "insert into feedback (id, study_id, kind, trial_a, label, source, author, created_at)
+         select printf('01890001-0000-7000-8%s-%012d', substr(study_id, 34, 3), number), study_id, 'label', id, 'converged', 'evaluation', 'x', created_at from trials
          where study_id = ?1 and number > ?2",
     )
     .bind(study.to_string())
@@ -90,7 +90,7 @@ pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
     sqlx::query(
         "with recursive n(i) as (select 1 union all select i + 1 from n where i < ?1)
          insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at)
-         select printf('01890003-0000-7000-8000-%012d', i), a.study_id, 'preference', a.id, b.id, 'clinician', 'x', a.created_at
+         select printf('01890003-0000-7000-8000-%012d', i + (select max(seq) from feedback)), a.study_id, 'preference', a.id, b.id, 'clinician', 'x', a.created_at
          from n join trials a on a.study_id = ?2 and a.number = 1 join trials b on b.study_id = ?2 and b.number = 2",
     )
     .bind(answers)

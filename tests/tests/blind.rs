@@ -156,9 +156,10 @@ async fn every_rater_answer_reaches_the_learner_including_repeats() {
     assert_eq!(told.status, StatusCode::OK, "{}", told.text);
     let after = send(&service, &admin, &Method::GET, &found, "", "").await.items();
     assert_eq!(after[0]["first_preferred"]["share"], 1.0, "this rater always says first");
-    for (pair, (first, second)) in
-        told.json()["pairs"].as_array().unwrap().iter().zip(sides(&service.store, study).await)
-    {
+    let of_rater = format!("/api/v1/studies/{study}/unblinded-pairs?rater=a%20rater");
+    let pairs = send(&service, &admin, &Method::GET, &of_rater, "", "").await.items();
+    assert_eq!(pairs.as_array().unwrap().len(), shown.len());
+    for (pair, (first, second)) in pairs.as_array().unwrap().iter().zip(sides(&service.store, study).await) {
         assert_eq!((&pair["shown_first"], &pair["shown_second"]), (&json!(first), &json!(second)));
         assert_eq!(pair["answer"], "first");
     }
@@ -377,12 +378,19 @@ async fn unblinding_requires_a_reason_is_audited_and_marks_later_answers() {
     let path = format!("/api/v1/studies/{study}/raters/unblind");
     let refused = post(&admin, &path, json!({"rater": "a rater", "reason": " "})).await;
     assert_eq!(refused.json()["field"], "reason");
+    let concealed =
+        send(&service, &admin, &Method::GET, &format!("/api/v1/studies/{study}/unblinded-pairs"), "", "").await;
+    assert_eq!(concealed.items(), json!([]), "before unblinding");
     let unknown = post(&admin, &path, json!({"rater": "nobody", "reason": "r"})).await;
     assert_eq!(unknown.json()["field"], "rater");
     let told = post(&admin, &path, json!({"rater": "a rater", "reason": "adverse event"})).await;
     assert_eq!(told.status, StatusCode::OK);
-    assert_eq!(told.json()["pairs"][0]["shown_first"], json!(sides(&service.store, study).await[0].0));
-    assert!(!told.text.contains(code));
+    let list = format!("/api/v1/studies/{study}/unblinded-pairs");
+    let read = send(&service, &admin, &Method::GET, &list, "", "").await;
+    assert_eq!(read.items()[0]["shown_first"], json!(sides(&service.store, study).await[0].0));
+    assert!(!read.text.contains(code));
+    let of_nobody = send(&service, &admin, &Method::GET, &format!("{list}?rater=nobody"), "", "").await;
+    assert_eq!(of_nobody.items(), json!([]));
     let rows = audit::page(&mut service.store.read().await.unwrap(), "", None, 1).await.unwrap();
     assert_eq!((rows[0].change.as_str(), &rows[0].detail["reason"]), ("study.unblind_rater", &json!("adverse event")));
     loop {

@@ -8,8 +8,9 @@ use gait_optimizer::Mesh;
 use gait_optimizer::export::ControllerFile;
 use gaitwright_service::workers::{GaitCertifier, GaitSolver};
 use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
-use gaitwright_store::trials::Trial;
+use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, events};
+use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::service::Service;
@@ -324,7 +325,7 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
     let service = Service::start_certifying(&folder.path().join("a.db"), GaitSolver, GaitCertifier).await;
     let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 2)).await;
     for outcome in
-        [json!({"outcome": "converged", "gait_rmse_rad": 0.2}), json!({"outcome": "not_converged", "reason": "r"})]
+        [json!({"label": "converged", "gait_rmse_rad": 0.2}), json!({"label": "not_converged", "reason": "r"})]
     {
         let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
         let trial = asked["id"].as_str().unwrap();
@@ -337,7 +338,33 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
             assert!(reasons.iter().any(|reason| refused.text.contains(reason)), "{}", refused.text);
         }
         let page = service.fetch(&format!("/trials/{trial}?sensitivities=true")).await.text;
-        assert_eq!(page.contains("gives no solution to compute sensitivities from"), outcome["outcome"] == "converged");
+        assert_eq!(page.contains("gives no solution to compute sensitivities from"), outcome["label"] == "converged");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn sensitivities_of_a_mesh_above_80_intervals_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    for (ss1, refused) in [(20, false), (21, true)] {
+        let mesh = Mesh { ds2: 20, ds3: 20, ss2: 20, ss1 };
+        let study = service.study(|new| (new.gait_settings.mesh, new.number_of_trials) = (mesh, 1)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        let trial = service.trials(study).await.remove(0);
+        assert_eq!(trial.state, TrialState::Converged);
+        let answer = service.fetch(&format!("/api/v1/trials/{}/sensitivities", trial.id)).await;
+        assert_eq!(
+            answer.status,
+            StatusCode::CONFLICT,
+            "an analytic gait has no solution of its mesh: {}",
+            answer.text
+        );
+        let reason = format!(
+            "The mesh of trial 1 has {} intervals. The service computes sensitivities for at most 80 intervals;",
+            60 + ss1
+        );
+        assert_eq!(answer.text.contains(&reason), refused, "{}", answer.text);
     }
     service.stop().await;
 }

@@ -141,7 +141,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
 
     let ask = format!("{api}/studies/{script}/ask");
     let asked = scene.one(done, "post /studies/{id}/ask", &ask, json!({})).await;
-    let tell = json!({"outcome": "not_converged", "reason": "r"});
+    let tell = json!({"label": "not_converged", "reason": "r"});
     scene.one(done, "post /trials/{id}/tell", &format!("{api}/trials/{}/tell", text(&asked["id"])), tell).await;
     let asked = scene.one(done, "post /studies/{id}/ask", &ask, json!({})).await;
     let cancel = format!("{api}/trials/{}/cancel", text(&asked["id"]));
@@ -293,7 +293,7 @@ fn essence(trials: &[Trial], feedback_rows: &[FeedbackRow]) -> Vec<String> {
     feedback_rows
         .iter()
         .map(|row| match row.content {
-            FeedbackContent::Label { trial, category } => format!("label {category} of {}", number(trial)),
+            FeedbackContent::Label { trial, label } => format!("label {} of {}", label.as_str(), number(trial)),
             FeedbackContent::Preference { winner, loser } => format!("{} over {}", number(winner), number(loser)),
             FeedbackContent::NoDifference { a, b } => format!("{} as good as {}", number(a), number(b)),
             FeedbackContent::Suggestion { suggested, over } => format!("{suggested:?} over {}", number(over)),

@@ -128,7 +128,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/lab-sessions/{session}/unblind"), json!({"reason": "r"})),
         (
             format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),
-            json!({"outcome": "converged", "gait_rmse_rad": 0.2}),
+            json!({"label": "converged", "gait_rmse_rad": 0.2}),
         ),
     ] {
         let refused = service.post(&path, &body).await;
@@ -317,7 +317,7 @@ async fn saved_responses_of_repeated_requests_are_withheld_after_withdrawal() {
     let trials = service.trials(finished).await;
     let told = (
         format!("/api/v1/trials/{}/tell", asked["id"].as_str().unwrap()),
-        json!({"outcome": "converged", "gait_rmse_rad": 0.3125}),
+        json!({"label": "converged", "gait_rmse_rad": 0.3125}),
     );
     let preferred = (
         format!("/api/v1/studies/{finished}/preferences"),

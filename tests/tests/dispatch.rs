@@ -11,7 +11,7 @@ use gaitwright_service::workers::{Assignment, Dispatch, EngineMessage, InProcess
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{StudyId, TrialId, attempts, jobs};
+use gaitwright_store::{StudyId, TrialId, attempts, solve_jobs};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::service::Service;
@@ -293,7 +293,7 @@ async fn queued_job_of_a_wiped_broker_is_dispatched_again_before_its_lease_expir
     let engine = JetStream::connect(&url, QUEUE, 1, LONG).await.unwrap();
     let service = Service::start_with(&rig.database(), Arc::new(engine)).await;
     let study = started(&service).await;
-    while jobs::depth(&mut service.store.read().await.unwrap()).await.unwrap() != (0, 1) {
+    while solve_jobs::depth(&mut service.store.read().await.unwrap()).await.unwrap() != (0, 1) {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
     // The broker has received the job.

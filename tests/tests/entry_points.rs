@@ -550,10 +550,7 @@ async fn person_answers_a_pair_either_blind_or_open_but_not_both() {
         assert_eq!(suggested.status, StatusCode::CONFLICT, "{}", suggested.text);
         let rows = scene.service.feedback(scene.study).await;
         let of_people = |from: usize| {
-            rows[from..]
-                .iter()
-                .filter(|row| row.source != Source::Convergence && row.source != Source::GaitRmse)
-                .count()
+            rows[from..].iter().filter(|row| row.source != Source::Evaluation && row.source != Source::GaitRmse).count()
         };
         assert_eq!(of_people(rows_before), 0, "blind first: {blind_first}");
         let next =

@@ -153,7 +153,7 @@ async fn study_without_failed_solves_is_not_explained() {
     let script = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 1)).await;
     let asked = service.post(&format!("/api/v1/studies/{script}/ask"), &json!({})).await.json();
     let told: TrialId = asked["id"].as_str().unwrap().parse().unwrap();
-    let outcome = json!({"outcome": "not_converged", "reason": "the foot scuffed"});
+    let outcome = json!({"label": "not_converged", "reason": "the foot scuffed"});
     assert_eq!(service.post(&format!("/api/v1/trials/{told}/tell"), &outcome).await.status, StatusCode::OK);
     service.wait_for(script, &[StudyState::Finished]).await;
     for (trial, reason) in [

@@ -138,10 +138,7 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
         // The page of a gait has one legend for the left and the right leg.
         for (page, bands) in [(format!("/studies/{study}/figures"), 5), (format!("/trials/{trial}"), 2)] {
             let page = service.fetch(&page).await.text;
-            assert_eq!(
-                page.contains("The band is one standard deviation of the reference gait over its strides."),
-                band
-            );
+            assert_eq!(page.contains("The band shows one standard deviation on either side of the mean."), band);
             assert_eq!(page.contains("has no standard deviation, so there is no band"), !band);
             assert_eq!(page.matches("</i>one standard deviation").count(), if band { bands } else { 0 }, "{page}");
         }

@@ -575,7 +575,7 @@ async fn script_trial_without_a_gait_offers_no_gait() {
     let study = service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 1)).await;
     let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
     let trial = trial["id"].as_str().unwrap();
-    let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
+    let told = json!({"label": "converged", "gait_rmse_rad": 0.21});
     assert_eq!(service.post(&format!("/api/v1/trials/{trial}/tell"), &told).await.status, StatusCode::OK);
     service.wait_for(study, &[StudyState::Finished]).await;
     for page in [format!("/studies/{study}"), format!("/trials/{trial}")] {

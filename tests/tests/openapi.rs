@@ -246,6 +246,7 @@ async fn responses_have_the_described_properties() {
         ("/studies/{id}/history", &study),
         ("/studies/{id}/preferences", &study),
         ("/studies/{id}/raters", &study),
+        ("/studies/{id}/unblinded-pairs", &study),
         ("/trials/{id}", &trial),
         ("/trials/{id}/iterations", &trial),
         ("/trials/{id}/attempts", &trial),

@@ -76,7 +76,7 @@ fn any_json() -> impl Strategy<Value = Value> {
             "values",
             "lengthscale",
             "reason",
-            "outcome",
+            "label",
             "gait_rmse_rad",
             "learner",
             "height_m",

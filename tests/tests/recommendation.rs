@@ -20,6 +20,7 @@ use gaitwright_store::trials::TrialState;
 use gaitwright_store::{StudyId, TrialId, certificates, commit};
 use gaitwright_tests::analytic::{Analytic, inactive_bound};
 use gaitwright_tests::certified::{Verdicts, certificate};
+use gaitwright_tests::large;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::users;
 use serde_json::{Value, json};
@@ -36,6 +37,46 @@ async fn recommendation(service: &Service, study: StudyId) -> Value {
     let answer = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text);
     answer.json()
+}
+
+#[tokio::test]
+async fn recommendation_of_a_study_with_many_answers_does_not_wait_for_the_posterior() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    for trial in service.trials(study).await {
+        if trial.state == TrialState::Converged {
+            let mut writer = service.store.write().await.unwrap();
+            // The service may have certified it already.
+            certificates::insert(&mut writer, trial.id, &certificate(true)).await.unwrap();
+            commit(writer).await.unwrap();
+        }
+    }
+    let entries = u32::try_from(service.feedback(study).await.len()).unwrap();
+    let paths = ["recommendation", "history"].map(|list| format!("/api/v1/studies/{study}/{list}"));
+    service.stop().await;
+    // At the limit, every request waits; one answer more, and none does.
+    for (answers, waits) in [(1500 - entries, true), (1, false)] {
+        large::answer_often(&database, study, answers).await;
+        let service = Service::start(&database, Analytic::default(), 1).await;
+        let computed = service.scheduler.analyses().computed();
+        for path in &paths {
+            assert_eq!(service.fetch(path).await.status, StatusCode::OK);
+        }
+        assert_eq!(service.scheduler.analyses().computed() > computed, waits);
+        let comparison =
+            format!("/api/v1/study-comparison?ids={study},{}", service.study(|new| new.start = false).await);
+        let newest = service.trials(study).await.pop().unwrap();
+        if !waits {
+            let best = json!(newest.best_before);
+            assert_eq!(recommendation(&service, study).await["trial_id"], best, "the last known best trial");
+            assert_eq!(service.fetch(&comparison).await.status, StatusCode::OK);
+            assert_eq!(service.scheduler.analyses().computed(), computed, "no posterior was computed");
+        }
+        service.stop().await;
+    }
 }
 
 #[tokio::test]

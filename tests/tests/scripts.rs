@@ -41,7 +41,7 @@ async fn run(service: &Service, study: StudyId, script: &str, trials: usize) -> 
         let trial = asked.json();
         assert_eq!(asked.headers["location"], format!("/api/v1/trials/{}", trial["id"].as_str().unwrap()));
         let rmse = 0.1 + (trial["action"]["a5"].as_f64().unwrap() - 0.026).abs();
-        let told = json!({"outcome": "converged", "gait_rmse_rad": rmse});
+        let told = json!({"label": "converged", "gait_rmse_rad": rmse});
         let told = service.post(&format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap()), &told).await;
         assert_eq!(told.status, StatusCode::OK, "{}", told.text);
         assert_eq!(told.json()["state"], "converged");
@@ -58,7 +58,7 @@ async fn lab_script_finishes_a_study_and_two_runs_give_the_same_trials() {
     let finished = service.wait_for(first, &[StudyState::Finished]).await;
     assert!(finished.state_reason.contains("All 8 trials"));
     let feedback = service.feedback(first).await;
-    assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "convergence").count(), 8);
+    assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "evaluation").count(), 8);
     assert_eq!(feedback.iter().filter(|row| row.source.as_str() == "gait_rmse").count(), 7);
 
     let second = script_study(&service, 8, 1).await;
@@ -105,19 +105,19 @@ async fn proposal_stays_with_its_worker() {
 
     let tell = format!("/api/v1/trials/{}/tell", left["id"].as_str().unwrap());
     for (body, field) in [
-        (json!({"outcome": "not_converged"}), "reason"),
-        (json!({"outcome": "converged"}), "gait_rmse_rad"),
-        (json!({"outcome": "converged", "gait_rmse_rad": -1}), "gait_rmse_rad"),
+        (json!({"label": "not_converged"}), "reason"),
+        (json!({"label": "converged"}), "gait_rmse_rad"),
+        (json!({"label": "converged", "gait_rmse_rad": -1}), "gait_rmse_rad"),
     ] {
         let refused = service.post(&tell, &body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
         assert_eq!(refused.json()["field"], field);
     }
-    let told = json!({"outcome": "not_converged", "reason": "the foot scuffed"});
+    let told = json!({"label": "not_converged", "reason": "the foot scuffed"});
     let told = service.post(&tell, &told).await.json();
     assert_eq!((&told["state"], &told["message"]), (&json!("not_converged"), &json!("the foot scuffed")));
     assert_eq!(
-        service.post(&tell, &json!({"outcome": "not_converged", "reason": "x"})).await.status,
+        service.post(&tell, &json!({"label": "not_converged", "reason": "x"})).await.status,
         StatusCode::CONFLICT
     );
     assert_ne!(service.post(&ask, &of("left")).await.json()["id"], left["id"]);
@@ -198,7 +198,22 @@ async fn finished_study_is_extended_cloned_and_compared() {
     assert_eq!((&first["items"][0], &service.fetch(&next).await.items()[0]), (&both[0], &both[1]));
     assert_eq!((&both[0]["id"], &both[1]["trials"]["total"]), (&json!(study), &json!(5)));
     assert!(both[0]["best_gait_rmse_rad"].is_f64());
-    for ids in [study.to_string(), format!("{study},{study}")] {
+    let mut six = vec![study, cloned];
+    for _ in 0..4 {
+        six.push(service.study(|new| new.start = false).await);
+    }
+    let of_six = six.iter().map(StudyId::to_string).collect::<Vec<_>>().join(",");
+    let (mut found, mut cursor) = (Vec::new(), String::new());
+    for expected in [5, 1] {
+        let path = format!("/api/v1/study-comparison?ids={of_six}&limit=1000{cursor}");
+        let page = service.fetch(&path).await.json();
+        let rows = page["items"].as_array().unwrap();
+        assert_eq!(rows.len(), expected, "a page has five studies at most, whatever its limit");
+        found.extend(rows.iter().map(|row| row["id"].clone()));
+        cursor = page["next"].as_str().map_or_else(String::new, |next| format!("&cursor={next}"));
+    }
+    assert_eq!((json!(found), cursor.as_str()), (json!(six), ""));
+    for ids in [study.to_string(), format!("{study},{study}"), vec![study.to_string(); 21].join(",")] {
         let refused = service.fetch(&format!("/api/v1/study-comparison?ids={ids}")).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{ids}");
         assert_eq!(refused.json()["field"], "ids");
@@ -218,7 +233,7 @@ async fn study_ends_by_solve_time_or_unchanged_best_action() {
     let settled = service.wait_for(settled, &[StudyState::Finished]).await;
     assert!(settled.state_reason.contains("has not changed over the last 6 results"), "{}", settled.state_reason);
     let timed = service.wait_for(timed, &[StudyState::Finished]).await;
-    assert!(timed.state_reason.contains("of the 1 s"), "{}", timed.state_reason);
+    assert!(timed.state_reason.contains("the limit is 1 s"), "{}", timed.state_reason);
     let trials = service.trials(timed.id).await.len();
     assert!((100..=101).contains(&trials), "{trials}");
     service.stop().await;
@@ -236,7 +251,7 @@ async fn people_compare_trials_of_a_lab_script() {
     for _ in 0..2 {
         let trial = service.post(&ask, &json!({})).await.json();
         let tell = format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap());
-        assert_eq!(service.post(&tell, &json!({"outcome": "converged"})).await.status, StatusCode::OK);
+        assert_eq!(service.post(&tell, &json!({"label": "converged"})).await.status, StatusCode::OK);
     }
     service.wait_for(study, &[StudyState::Waiting]).await;
     assert_eq!(service.post(&ask, &json!({})).await.status, StatusCode::CONFLICT, "first the answer");
@@ -264,8 +279,8 @@ async fn trial_without_convergence_counts_in_its_batch_and_is_not_compared() {
     for number in 1..=5 {
         let trial = service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
         let told = match number {
-            2 | 4 => json!({"outcome": "not_converged", "reason": "the foot scuffed"}),
-            _ => json!({"outcome": "converged", "gait_rmse_rad": 1.0 / f64::from(number)}),
+            2 | 4 => json!({"label": "not_converged", "reason": "the foot scuffed"}),
+            _ => json!({"label": "converged", "gait_rmse_rad": 1.0 / f64::from(number)}),
         };
         let tell = format!("/api/v1/trials/{}/tell", trial["id"].as_str().unwrap());
         assert_eq!(service.post(&tell, &told).await.status, StatusCode::OK);

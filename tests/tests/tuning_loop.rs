@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
-use gait_learner::{LearnerSettings, Method, Partner};
+use gait_learner::{Dimension, LearnerSettings, Method, Partner, SearchSpace};
 use gaitwright_service::studies::pending_comparison::pending_comparison;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::NewStudy;
@@ -137,6 +137,14 @@ async fn study_of_thirty_trials_has_no_gait_twice_unless_results_may_repeat() {
             assert_eq!(distinct.len() < converged.count(), repeats, "{method:?}");
             let page = service.fetch(&format!("/studies/{study}")).await.text;
             assert!(page.contains("Bounds that have not been active in any gait so far: a2, a3, a4, a8."), "{page}");
+            let recommendation = loop {
+                let found = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
+                if found.status == StatusCode::OK {
+                    break found.json();
+                }
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            };
+            assert_eq!(recommendation["never_active"], json!(["a2", "a3", "a4", "a8"]));
         }
     }
     service.stop().await;
@@ -199,6 +207,35 @@ async fn gaits_from_a_root_do_not_depend_on_other_trials() {
     }
     assert_eq!(roots.len(), 1, "the root depends on the problem only");
     service.stop().await;
+}
+
+#[tokio::test]
+async fn jump_to_another_local_optimum_is_stated_on_pages_and_through_rest() {
+    let of_root = ["", "with looser bounds, trial 1 has an objective of 0.300", "Found by a cold start"];
+    let of_last = ["", "", "with stricter bounds, trial "];
+    for (jumps, cold_after_warm, base_a2, expected) in [(1, vec![3], 90.0, of_root), (3, Vec::new(), 70.0, of_last)] {
+        let folder = tempfile::tempdir().unwrap();
+        let engine = Analytic { jumps: vec![jumps], cold_after_warm, ..Analytic::default() };
+        let service = Service::start(&folder.path().join("a.db"), engine, 1).await;
+        let study = service
+            .study(|new| {
+                new.base_bounds.a2 = base_a2;
+                (new.search_space, new.repeat_results) = (Some(inactive_bound().into()), Some(true));
+                (new.number_of_trials, new.warm_start_from) = (3, WarmStartFrom::Root);
+            })
+            .await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        for (trial, expected) in service.trials(study).await.iter().zip(expected) {
+            assert_eq!(trial.state, TrialState::Converged);
+            let served = service.fetch(&format!("/api/v1/trials/{}", trial.id)).await.json();
+            assert_eq!(served["message"], json!(trial.message));
+            assert!(trial.message.contains(expected), "{:?}, expected {expected:?}", trial.message);
+            assert_eq!(trial.message.is_empty(), expected.is_empty(), "{:?}", trial.message);
+            let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
+            assert!(page.contains(&trial.message), "{page}");
+        }
+        service.stop().await;
+    }
 }
 
 #[tokio::test]
@@ -411,14 +448,52 @@ async fn equal_gaits_are_never_offered_for_comparison() {
     let [first, second] = service.trials(study).await.try_into().unwrap();
     let answer = json!({"trial_a": first.id, "trial_b": second.id, "answer": "a", "author": "S01"});
     service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
-    service.wait_for_trials(study, 3).await;
-    service.wait_for(study, &[StudyState::Waiting]).await;
+    // The third gait is that of the second, which has been compared with the first.
+    service.wait_for(study, &[StudyState::Finished]).await;
     let third = service.trials(study).await.remove(2);
     assert_eq!((third.warm_started_from, second.warm_started_from), (Some(first.id), Some(first.id)));
     assert_eq!(third.gait_rmse_rad, second.gait_rmse_rad);
-    let snapshot =
-        StudySnapshot::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
-    let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &snapshot)).await.unwrap();
-    assert_eq!(pending.unwrap().trials(), Some((third.id, first.id)), "the one before is the same gait");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn people_compare_two_gaits_once_whatever_actions_have_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    for (seed, partner) in (1..).zip([Partner::Incumbent, Partner::Previous, Partner::Every]) {
+        let study = service
+            .study(|new| {
+                let swing = Dimension { name: "a6".to_owned(), values: vec![0.2, 0.3, 0.4], lengthscale: 0.1 };
+                let dimensions = [inactive_bound().dimensions(), &[swing]].concat();
+                new.search_space = Some(SearchSpace::new(dimensions).unwrap().into());
+                new.learner = LearnerSettings { partner, buffer: 3, repeats: false, ..LearnerSettings::default() };
+                (new.repeat_results, new.warm_start_from) = (Some(true), WarmStartFrom::Root);
+                (new.seed, new.number_of_trials, new.answer_source) = (seed, 9, AnswerSource::People);
+            })
+            .await;
+        let mut asked = HashSet::new();
+        while service.wait_for(study, &[StudyState::Waiting, StudyState::Finished]).await.state == StudyState::Waiting {
+            let snapshot =
+                StudySnapshot::read(&mut service.store.read().await.unwrap(), service.get(study).await).await.unwrap();
+            let trials = snapshot.trials.clone();
+            let pending = service.store.clone().compute(move |pool| pending_comparison(pool, &snapshot)).await.unwrap();
+            let Some((a, b)) = pending.unwrap().trials() else {
+                tokio::time::sleep(Duration::from_millis(5)).await;
+                continue;
+            };
+            let of = |id| trials.iter().find(|trial| trial.id == id).unwrap().gait_rmse_rad.unwrap();
+            let (least, most) = (of(a).min(of(b)), of(a).max(of(b)));
+            assert!(least < most, "a gait is compared with itself");
+            assert!(
+                asked.insert((least.to_bits(), most.to_bits())),
+                "{partner:?}: asked again about {least} and {most}"
+            );
+            let answer = if of(a) < of(b) { "a" } else { "b" };
+            let answer = json!({"trial_a": a, "trial_b": b, "answer": answer, "author": "S01"});
+            service.post(&format!("/api/v1/studies/{study}/preferences"), &answer).await;
+        }
+        assert_eq!(service.trials(study).await.len(), 9);
+        assert!(!asked.is_empty());
+    }
     service.stop().await;
 }

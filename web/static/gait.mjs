@@ -27,7 +27,7 @@ const legBetween = (a, b, share) => ({
 });
 
 /**
- * The figure at a time within the stride.
+ * The walker at a time within the stride.
  * @param {Motion} motion
  * @param {number} time
  * @returns {Frame}
@@ -60,22 +60,22 @@ const inWords = (domain) => {
 };
 
 /**
- * The reference gait of a figure, which the server wrote into it: joints in mm, one stride at equal time steps.
+ * The reference gait of a walker, which the server wrote into it: joints in mm, one stride at equal time steps.
  * @param {SVGSVGElement} svg
  * @returns {StickFigure[]}
  */
 function referenceOf(svg) {
   const written = svg.querySelector("[data-ghost]")?.getAttribute("data-ghost");
   if (!written) return [];
-  return written.split(";").map((figure) => {
-    const mm = figure.split(" ").map(Number);
+  return written.split(";").map((place) => {
+    const mm = place.split(" ").map(Number);
     const joint = (/** @type {number} */ i) => /** @type {Place} */ ([mm[2 * i] / 1000, mm[2 * i + 1] / 1000]);
     const leg = (/** @type {number} */ i) => ({ knee: joint(i), ankle: joint(i + 1), heel: joint(i + 2), toe: joint(i + 3) });
     return { hip: joint(0), shoulder: joint(1), left: leg(2), right: leg(6) };
   });
 }
 
-/** A gait in its figure. */
+/** A gait with its walker. */
 class Scene {
   /**
    * @param {SVGSVGElement} svg
@@ -111,7 +111,7 @@ class Scene {
 
   /**
    * @param {number} strides Whole ones and the share of this one.
-   * @param {StickFigure | null} ghost The second figure.
+   * @param {StickFigure | null} ghost The second walker.
    */
   draw(strides, ghost) {
     const frame = this.frame(strides % 1);
@@ -207,7 +207,7 @@ class Player {
     requestAnimationFrame((next) => this.tick(next));
   }
 
-  /** @param {number} place @param {number[]} strides @returns {StickFigure | null} The figure behind a scene. */
+  /** @param {number} place @param {number[]} strides @returns {StickFigure | null} The walker behind a scene. */
   ghost(place, strides) {
     if (!this.overlay.checked) return null;
     const other = this.scenes[1 - place];
@@ -238,16 +238,16 @@ const load = async (trial) => {
 };
 
 /**
- * Makes the figures of a box walk.
+ * Makes the walkers of a box walk.
  * @param {HTMLElement} box
  */
 export function startWalker(box) {
-  const figures = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-walker"));
-  const controls = addControls(box, figures.length > 1);
+  const walkers = /** @type {NodeListOf<SVGSVGElement>} */ (box.querySelectorAll("[data-trial] svg.gait-walker"));
+  const controls = addControls(box, walkers.length > 1);
   for (const hint of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-drag]"))) hint.hidden = false;
   if (!mayMove()) showStrips(box.querySelector("noscript") ? box : document);
   const trial = (/** @type {Element} */ svg) => /** @type {HTMLElement} */ (svg.closest("[data-trial]")).dataset.trial;
-  Promise.all([...figures].map(async (svg) => new Scene(svg, await load(trial(svg)))))
+  Promise.all([...walkers].map(async (svg) => new Scene(svg, await load(trial(svg)))))
     .then((scenes) => new Player(controls, scenes))
     .catch((error) => {
       controls.textContent = `The animation cannot be loaded (${error.message}). Reload the page to try again.`;

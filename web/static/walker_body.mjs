@@ -16,7 +16,7 @@ export const UNITS = 100;
 const LEAST_FORCE_N = 10;
 const ARROW_HEAD = 5;
 
-/** @type {(figure: StickFigure) => Record<string, [Place, Place, Place, number]>} Origin, direction, and its angle at rest. */
+/** @type {(walker: StickFigure) => Record<string, [Place, Place, Place, number]>} Origin, direction, and its angle at rest. */
 const frames = ({ hip, shoulder, left, right }) => ({
   trunk: [hip, hip, shoulder, -90],
   "left.thigh": [hip, hip, left.knee, 90],
@@ -29,15 +29,15 @@ const frames = ({ hip, shoulder, left, right }) => ({
 
 /**
  * Where the segments are in a drawing whose origin is on the ground below the hip.
- * @param {StickFigure} figure
+ * @param {StickFigure} walker
  * @returns {Record<string, Placement>}
  */
-export function placements(figure) {
+export function placements(walker) {
   /** @type {Record<string, Placement>} */
   const placed = {};
-  for (const [name, [origin, from, to, rest]] of Object.entries(frames(figure))) {
+  for (const [name, [origin, from, to, rest]] of Object.entries(frames(walker))) {
     const degrees = (Math.atan2(from[1] - to[1], to[0] - from[0]) * 180) / Math.PI - rest;
-    placed[name] = { x: (origin[0] - figure.hip[0]) * UNITS, y: -origin[1] * UNITS, degrees };
+    placed[name] = { x: (origin[0] - walker.hip[0]) * UNITS, y: -origin[1] * UNITS, degrees };
   }
   return placed;
 }
@@ -124,9 +124,9 @@ export class Walker {
     path?.setAttribute("d", line);
   }
 
-  /** @param {StickFigure | null} figure The pose of the second figure; without one it is hidden. */
-  poseGhost(figure) {
-    this.ghost?.setAttribute("visibility", figure ? "visible" : "hidden");
-    if (figure) this.ghostBody?.pose(placements(figure));
+  /** @param {StickFigure | null} walker The pose of the second walker; without one it is hidden. */
+  poseGhost(walker) {
+    this.ghost?.setAttribute("visibility", walker ? "visible" : "hidden");
+    if (walker) this.ghostBody?.pose(placements(walker));
   }
 }

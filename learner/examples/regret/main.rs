@@ -14,6 +14,9 @@
 //! `atlas1` and `atlas1m` are the gaits of subject 1 without and with muscles, and `--problem ATLAS.csv` reads another table of
 //! `gaitwright atlas`. Each seed is a person whose utility is a random mixture of the columns, of which low values are better.
 //!
+//! For these problems, `--known-gaits on` proposes no action with the gait of a visited one, as studies do, and
+//! `--inactive-bounds on` lets the learner ignore bounds that were active in no visited gait.
+//!
 //! Writes rows `method,seed,k,regret`: regret after `k` comparisons, that is `k + 1` visited actions. Prints quartiles.
 //! Regret is 1 minus the utility of the recommended action. `--noise S` adds logistic noise of scale `S` to the
 //! utility. `--batch N` proposes `N` actions at a time. `--set` changes settings. `--seeds A..B` excludes `B`.
@@ -33,7 +36,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use gait_learner::LearnerSettings;
-use problems::Problem;
+use problems::{Knowledge, Problem};
 use simulation::{Person, champion, run};
 use summary::{Curves, quantile, report};
 use table::{DEFAULT_COLUMNS, Table};
@@ -47,6 +50,7 @@ struct Options {
     lengthscale: Option<f64>,
     columns: String,
     batch: usize,
+    knowledge: Knowledge,
     set: serde_json::Map<String, serde_json::Value>,
     out: Option<String>,
 }
@@ -56,6 +60,15 @@ fn number(name: &str, value: &str, least: f64) -> Result<f64, String> {
     match value.parse::<f64>() {
         Ok(number) if number.is_finite() && number >= least => Ok(number),
         _ => Err(format!("{name}: {value} is not a number of at least {least}")),
+    }
+}
+
+/// Parses `on` or `off`.
+fn switch(name: &str, value: &str) -> Result<bool, String> {
+    match value {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err(format!("{name}: {value} is not on or off")),
     }
 }
 
@@ -69,6 +82,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
         lengthscale: None,
         columns: DEFAULT_COLUMNS.into(),
         batch: 1,
+        knowledge: Knowledge::default(),
         set: serde_json::Map::new(),
         out: None,
     };
@@ -90,6 +104,8 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--lengthscale" => options.lengthscale = Some(number(&name, &value, 1e-6)?),
             "--columns" => options.columns = value,
             "--batch" => options.batch = value.parse::<usize>()?.max(1),
+            "--known-gaits" => options.knowledge.gaits = switch(&name, &value)?,
+            "--inactive-bounds" => options.knowledge.inactive = switch(&name, &value)?,
             "--set" => options.set = serde_json::from_str(&value)?,
             "--out" => options.out = Some(value),
             _ => return Err(format!("unknown option {name}").into()),
@@ -153,7 +169,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         let person = Person::new(&problem, options.noise, seed);
         let regrets = match &settings {
-            Some(settings) => run(person, settings, options.comparisons, options.batch)?,
+            Some(settings) => run(person, settings, options.comparisons, options.batch, options.knowledge)?,
             None => champion(person, options.comparisons),
         };
         if let Some(out) = &mut out {

@@ -4,7 +4,7 @@
 //! which 35 % do not converge. It uses splitmix64 only, so that other languages can reproduce it. `hart3` and `hart6`
 //! are the Hartmann functions on the grids of POLAR's examples.
 
-use gait_learner::{ActionIndex, Dimension, SearchSpace};
+use gait_learner::{ActionIndex, Dimension, LearnerError, SearchSpace};
 
 /// A grid with the utility of every action in `[0, 1]`.
 pub struct Problem {
@@ -12,9 +12,65 @@ pub struct Problem {
     /// Utility of each action; 0 if it does not converge.
     pub utility: Vec<f64>,
     pub converged: Vec<bool>,
+    /// For problems from a table of gaits: the gait of each action, and the dimensions that are active in it.
+    pub gaits: Option<std::rc::Rc<Vec<GaitOfAction>>>,
 }
 
+/// The gait of an action.
+#[derive(Clone, Default)]
+pub struct GaitOfAction {
+    /// Its number; 0 without a gait.
+    pub number: u32,
+    /// Whether each dimension is active in it.
+    pub active: Vec<bool>,
+}
+
+/// What a study knows of gaits besides the answers.
+#[derive(Clone, Copy, Default)]
+pub struct Knowledge {
+    /// Which actions have the gait of a visited action: they are not proposed.
+    pub gaits: bool,
+    /// Which dimensions were active in no gait so far: the learner ignores them.
+    pub inactive: bool,
+}
+
+/// Number of gaits from which on a dimension that was active in none of them is ignored.
+const FEWEST_GAITS: usize = 2;
+/// Factor on the lengthscale of a dimension that the learner ignores: its levels are fully correlated.
+const IGNORED: f64 = 1e4;
+
 impl Problem {
+    /// The actions whose gait is that of a visited action, as boxes; `None` if the problem has no gaits.
+    pub fn actions_with_gaits_of(&self, visited: &[ActionIndex]) -> Option<Vec<Vec<std::ops::Range<usize>>>> {
+        let gaits = self.gaits.as_ref()?;
+        let known: std::collections::HashSet<u32> = self.gaits_of(visited).map(|gait| gait.number).collect();
+        let same = (0..).zip(gaits.iter()).filter(|(_, gait)| known.contains(&gait.number));
+        let alone = |(action, _): (u64, &GaitOfAction)| {
+            self.space.levels(ActionIndex(action)).into_iter().map(|level| level..level + 1).collect()
+        };
+        Some(same.map(alone).collect())
+    }
+
+    /// The search space of the learner after these actions.
+    pub fn space_after(&self, visited: &[ActionIndex], knowledge: Knowledge) -> Result<SearchSpace, LearnerError> {
+        let gaits: Vec<&GaitOfAction> = self.gaits_of(visited).collect();
+        if !knowledge.inactive || gaits.len() < FEWEST_GAITS {
+            return Ok(self.space.clone());
+        }
+        let mut dimensions = self.space.dimensions().to_vec();
+        for (d, dimension) in dimensions.iter_mut().enumerate() {
+            if gaits.iter().all(|gait| !gait.active[d]) {
+                dimension.lengthscale *= IGNORED;
+            }
+        }
+        SearchSpace::new(dimensions)
+    }
+
+    fn gaits_of(&self, visited: &[ActionIndex]) -> impl Iterator<Item = &GaitOfAction> {
+        let gait = |action: &ActionIndex| self.gaits.as_ref()?.get(usize::try_from(action.0).ok()?);
+        visited.iter().filter_map(gait).filter(|gait| gait.number > 0)
+    }
+
     /// The problem with this name. `lengthscale`, in the unit of the values, replaces the default.
     pub fn named(name: &str, seed: u64, lengthscale: Option<f64>) -> Option<Self> {
         match name {
@@ -134,7 +190,7 @@ fn table1(seed: u64, lengthscale: f64) -> Problem {
     };
     let (low, high) = (among(f64::min, f64::INFINITY), among(f64::max, f64::NEG_INFINITY));
     let utility = f.iter().zip(&converged).map(|(f, &c)| if c { (f - low) / (high - low) } else { 0.0 }).collect();
-    Problem { space, utility, converged }
+    Problem { space, utility, converged, gaits: None }
 }
 
 const ALPHA: [f64; 4] = [1.0, 1.2, 3.0, 3.2];
@@ -170,7 +226,7 @@ fn hartmann<const D: usize>(n: usize, a: &[[f64; D]; 4], p: &[[f64; D]; 4], leng
     let (low, high) = raw.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
     let utility = raw.iter().map(|v| (v - low) / (high - low)).collect();
     let converged = vec![true; raw.len()];
-    Problem { space, utility, converged }
+    Problem { space, utility, converged, gaits: None }
 }
 
 /// The maximum of the raw Hartmann function in 3 or 6 dimensions over the grid, and its position.

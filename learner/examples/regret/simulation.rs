@@ -1,8 +1,10 @@
 //! Simulated studies: a person with a known utility, and the regret of the recommended action.
 
-use gait_learner::{ActionIndex, Feedback, FeedbackLog, Learner, LearnerError, LearnerSettings};
+use gait_learner::{
+    ActionIndex, ExcludedActions, Feedback, FeedbackLog, Learner, LearnerError, LearnerSettings, propose_outside,
+};
 
-use crate::problems::{Problem, SplitMix64};
+use crate::problems::{Knowledge, Problem, SplitMix64};
 
 /// A simulated person who answers comparisons by a known utility with noise.
 pub struct Person<'a> {
@@ -40,6 +42,7 @@ pub fn run(
     settings: &LearnerSettings,
     comparisons: usize,
     batch: usize,
+    knowledge: Knowledge,
 ) -> Result<Vec<f64>, LearnerError> {
     let problem = person.problem;
     let labelled = problem.converged.iter().any(|c| !c);
@@ -48,18 +51,28 @@ pub fn run(
     let mut regrets = Vec::new();
     while regrets.len() <= comparisons {
         let mut proposed: Vec<ActionIndex> = Vec::new();
+        let space = problem.space_after(&log.visited, knowledge)?;
         while proposed.len() < batch {
             let seed = person.seed;
-            proposed.push(learner.propose(&problem.space, &log, &proposed, settings, seed)?.action);
+            let gaits = knowledge.gaits.then(|| problem.actions_with_gaits_of(&log.visited)).flatten();
+            proposed.push(match gaits {
+                Some(known) => {
+                    let known = ExcludedActions::new(&space, known)?;
+                    propose_outside(&space, &log, &proposed, &known, settings, seed)?.action
+                }
+                None => learner.propose(&space, &log, &proposed, settings, seed)?.action,
+            });
         }
         for action in proposed {
-            let comparisons = learner.proposed_comparisons(&problem.space, &log, action, settings)?;
+            let space = problem.space_after(&log.visited, knowledge)?;
+            let comparisons = learner.proposed_comparisons(&space, &log, action, settings)?;
             if labelled {
                 log.feedback.push(Feedback::Label { action, category: usize::from(problem.of(action).1) });
             }
             log.feedback.extend(comparisons.iter().filter_map(|comparison| person.compare(action, comparison.against)));
             log.visited.push(action);
-            let best = learner.posterior(&problem.space, &log, settings)?.best();
+            let space = problem.space_after(&log.visited, knowledge)?;
+            let best = learner.posterior(&space, &log, settings)?.best();
             // An action has been visited, so there is a best one.
             regrets.push(best.map_or(1.0, |best| 1.0 - problem.of(best).0));
         }

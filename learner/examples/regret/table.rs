@@ -4,9 +4,10 @@
 //!
 //! Two such tables are part of the project; `atlases/README.md` says how they are made.
 
-use crate::problems::{Problem, SplitMix64};
+use crate::problems::{GaitOfAction, Problem, SplitMix64};
 use gait_learner::{Dimension, SearchSpace};
 use std::path::Path;
+use std::rc::Rc;
 
 /// Name and content of each built-in table: the atlas of subject 1, without and with muscles.
 const BUILT_IN: [(&str, &[u8]); 2] =
@@ -23,6 +24,8 @@ pub struct Table {
     space: SearchSpace,
     /// For each action, the chosen columns, scaled from 0 (worst) to 1 (best); `None` if it did not converge.
     merits: Vec<Option<Vec<f64>>>,
+    /// The gait of each action, if the table numbers them.
+    gaits: Option<Rc<Vec<GaitOfAction>>>,
 }
 
 impl Table {
@@ -77,9 +80,11 @@ impl Table {
             return Err(format!("the table has {} rows; its grid has {} actions", rows.len(), space.len()));
         }
         let mut merits = vec![None; rows.len()];
+        let numbered = place("gait").ok().zip(place("active").ok());
+        let mut gaits = vec![GaitOfAction::default(); rows.len()];
         let ranges: Vec<(f64, f64)> =
             (0..chosen.len()).map(|c| range(raw.iter().flatten().map(|row| row[c]))).collect();
-        for (action, row) in actions.iter().zip(raw) {
+        for ((action, row), cells) in actions.iter().zip(raw).zip(&rows) {
             let levels: Vec<usize> = action
                 .iter()
                 .zip(&values)
@@ -89,9 +94,18 @@ impl Table {
             let scaled = |row: Vec<f64>| {
                 row.iter().zip(&ranges).map(|(value, (low, high))| (high - value) / (high - low).max(1e-12)).collect()
             };
-            merits[usize::try_from(index.0).map_err(|error| error.to_string())?] = row.map(scaled);
+            let index = usize::try_from(index.0).map_err(|error| error.to_string())?;
+            if let Some((number, active)) = numbered {
+                let cell = |place: usize| cells.get(place).copied().unwrap_or_default();
+                let is_active = |name: &&str| cell(active).split(' ').any(|active| active == *name);
+                gaits[index] = GaitOfAction {
+                    number: cell(number).parse().unwrap_or(0),
+                    active: header[..DIMENSIONS].iter().map(is_active).collect(),
+                };
+            }
+            merits[index] = row.map(scaled);
         }
-        Ok(Self { space, merits })
+        Ok(Self { space, merits, gaits: numbered.map(|_| Rc::new(gaits)) })
     }
 
     /// The problem of one person.
@@ -111,6 +125,7 @@ impl Table {
             space: self.space.clone(),
             utility: utility.collect(),
             converged: mixed.iter().map(Option::is_some).collect(),
+            gaits: self.gaits.clone(),
         }
     }
 }

@@ -11,7 +11,7 @@
 use crate::acquisition::avoidance::Avoidance;
 use crate::action::ActionIndex;
 use crate::excluded::ForbiddenActions;
-use crate::likelihood::Interval;
+use crate::interval_likelihood::Interval;
 use crate::posterior::Posterior;
 use crate::random::Random;
 use crate::settings::{Labels, LearnerSettings, Partner};

@@ -6,7 +6,7 @@
 use super::{Approximate, ExpectationPropagation, Laplace};
 use crate::action::ActionIndex;
 use crate::fit::{Fit, ProcessModel};
-use crate::likelihood::{Interval, Link};
+use crate::interval_likelihood::{Interval, Link};
 use crate::observations::Observation;
 use crate::observations::ObservedPoints;
 use crate::random::Random;

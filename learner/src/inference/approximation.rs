@@ -4,7 +4,7 @@
 //! functional `d`. The methods differ in how they choose `shift` and `precision`.
 
 use crate::error::Result;
-use crate::likelihood::Link;
+use crate::interval_likelihood::Link;
 use crate::linalg::{Block, Cholesky, Square, add_scaled, block_dots};
 use crate::observations::{ObservedPoints, Site};
 

@@ -6,8 +6,8 @@
 use super::approximation::{Approximate, Approximation, SiteFactor};
 use super::site_updates::{Cavity, WorkingApproximation};
 use crate::error::{LearnerError, Result};
-use crate::likelihood::Link;
-use crate::likelihood::LogLikelihood;
+use crate::interval_likelihood::Link;
+use crate::interval_likelihood::LogLikelihood;
 use crate::observations::{ObservedPoints, Site};
 
 /// Expectation propagation with sequential updates.

@@ -6,7 +6,7 @@
 
 use super::approximation::{Approximate, Approximation, covariance, whitened_precision};
 use crate::error::{LearnerError, Result};
-use crate::likelihood::Link;
+use crate::interval_likelihood::Link;
 use crate::linalg::dot;
 use crate::observations::{ObservedPoints, Site};
 
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::action::ActionIndex;
     use crate::fit::{Fit, ProcessModel};
-    use crate::likelihood::Interval;
+    use crate::interval_likelihood::Interval;
     use crate::observations::Observation;
     use crate::random::Random;
     use crate::search_space::{Dimension, SearchSpace};

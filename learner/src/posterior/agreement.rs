@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::action::ActionIndex;
 use crate::feedback::Feedback;
-use crate::likelihood::Interval;
+use crate::interval_likelihood::Interval;
 use crate::posterior::Posterior;
 
 /// Number of pieces of feedback, and of those that the posterior agrees with.

@@ -3,7 +3,7 @@
 use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::gaussian_process::GaussianProcess;
-use crate::likelihood::{Interval, Link};
+use crate::interval_likelihood::{Interval, Link};
 use crate::posterior::Posterior;
 use crate::special_functions;
 

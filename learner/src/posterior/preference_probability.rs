@@ -2,7 +2,7 @@
 
 use crate::action::ActionIndex;
 use crate::error::Result;
-use crate::likelihood::Interval;
+use crate::interval_likelihood::Interval;
 use crate::posterior::Posterior;
 
 impl Posterior {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer};
 
 use super::{Inference, Labels, LearnerSettings, Method, Partner, Start};
-use crate::likelihood::Link;
+use crate::interval_likelihood::Link;
 
 /// Wraps the value of a present field, so that `null` stays distinct from a missing field.
 fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<T>, D::Error> {

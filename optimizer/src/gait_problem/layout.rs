@@ -244,7 +244,7 @@ impl Layout {
                 return (format!("{name} Bezier coefficient"), "rad");
             }
             if layout.impulse.is_some_and(|first| index >= first && index < first + layout.contacts) {
-                return (format!("{name} opening impulse"), "N s");
+                return (format!("{name} impact impulse"), "N s");
             }
         }
         if index >= self.hip_velocities && index < self.hip_velocities + 4 {

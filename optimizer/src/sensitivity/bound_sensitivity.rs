@@ -1,9 +1,13 @@
-//! The sensitivities of a gait, as they are reported.
+//! The sensitivity of a gait with respect to a tuned bound: how its solution and its results follow.
 
-use super::active::ActiveConstraint;
+use super::active::{self, ActiveConstraint, ActiveSet};
+use super::program_derivatives::program_derivative;
 use super::result_derivatives::ResultDerivatives;
-use crate::solve::SolveError;
-use interior_point::SensitivityError;
+use crate::gait_problem::{ConvergedGait, GaitProblem, GaitProgram, UnchangedBound, gait_of};
+use crate::model_error::ModelError;
+use crate::solve::{GaitResults, SolveError, SolveOptions, WarmStart, check_shape, final_settings};
+use crate::tuned_bounds::TunedBounds;
+use interior_point::{ParameterDerivative, Sensitivity, SensitivityError};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -44,4 +48,76 @@ pub enum GaitSensitivityError {
     /// The solution is not regular.
     #[error(transparent)]
     Sensitivity(#[from] SensitivityError),
+}
+
+/// The program at a solution, how it depends on each tuned bound, and how the solution follows.
+pub(super) struct PointSensitivities {
+    pub(super) program: GaitProgram,
+    parameters: Vec<ParameterDerivative>,
+    sensitivities: Vec<Sensitivity>,
+    /// Empty if the gait exceeds bounds between its nodes.
+    unchanged_bounds: Vec<UnchangedBound>,
+}
+
+impl PointSensitivities {
+    pub(super) fn new(
+        problem: &GaitProblem,
+        solution: &WarmStart,
+        options: &SolveOptions,
+    ) -> Result<Self, GaitSensitivityError> {
+        let program = problem.program(problem.muscles).map_err(SolveError::from)?;
+        if solution.muscles != problem.muscles || solution.mesh != problem.settings.mesh {
+            return Err(
+                SolveError::WarmStartShape("its variant or mesh differs from that of the problem".to_owned()).into()
+            );
+        }
+        check_shape(&program, solution)?;
+        let converged = ConvergedGait {
+            problem,
+            program: &program,
+            margins: &solution.margins,
+            gait: &gait_of(problem, &program, &solution.point.x),
+            point: &solution.point,
+            tolerance: options.tolerance,
+            checks_between_nodes: options.tightening_rounds > 0,
+        };
+        let unchanged_bounds = converged.unchanged_bounds();
+        let program = program.tightened(&solution.margins);
+        let parameters: Result<Vec<_>, ModelError> =
+            (0..TunedBounds::COUNT).map(|bound| program_derivative(problem, &program, solution, bound)).collect();
+        let parameters = parameters.map_err(SolveError::from)?;
+        let sensitivities =
+            interior_point::sensitivities(&program, &solution.point, &final_settings(options), &parameters)?;
+        Ok(Self { program, parameters, sensitivities, unchanged_bounds })
+    }
+
+    /// Mechanical cost of transport of the solution.
+    pub(super) fn cost_of_transport(&self, problem: &GaitProblem, solution: &WarmStart) -> f64 {
+        let gait = gait_of(problem, &self.program, &solution.point.x);
+        GaitResults::of_well_formed(&gait, &self.program.model, &problem.reference).cost_of_transport
+    }
+
+    pub(super) fn of_bound(&self, problem: &GaitProblem, solution: &WarmStart, bound: usize) -> BoundSensitivity {
+        let (parameter, sensitivity) = (&self.parameters[bound], &self.sensitivities[bound]);
+        let value = problem.bounds.to_array()[bound];
+        let set = ActiveSet::new(&self.program, &solution.point);
+        let active = active::of_parameter(&self.program, &set, parameter);
+        // Which of two limits is the stricter one can change beyond the point, which no derivative shows. For a bound that is
+        // not active, the interval is known exactly.
+        let interval = match self.unchanged_bounds.get(bound) {
+            Some(unchanged) if active.is_empty() => (unchanged.least, unchanged.most),
+            _ => {
+                let (back, forth) = set.steps(parameter, &sensitivity.point);
+                (back.map(|step| value + step), forth.map(|step| value + step))
+            }
+        };
+        BoundSensitivity {
+            bound: TunedBounds::NAMES[bound],
+            value,
+            active,
+            derivatives: ResultDerivatives::along(problem, &self.program, &solution.point.x, sensitivity),
+            interval,
+            is_weakly_active: set.is_weak(parameter),
+        }
+    }
 }

@@ -113,7 +113,7 @@ impl Figure {
         let table = match &self.drawing {
             Drawing::Chart(chart) => chart_csv(chart),
             Drawing::Tiles(_, figures) => tiles_csv(figures),
-            Drawing::Animation(_, animation) => tiles_csv(animation.figures()),
+            Drawing::Animation(_, animation) => tiles_csv(animation.stick_figures()),
             Drawing::Map(map) => map_csv(map),
             Drawing::Parallel(parallel) => parallel_csv(parallel),
             Drawing::Tree(tree) => tree_csv(tree),

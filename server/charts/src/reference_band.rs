@@ -58,7 +58,7 @@ pub(crate) fn over_reference_of_leg(
 /// A sentence that explains the band.
 pub fn band_in_words(reference: &ReferenceGait) -> &'static str {
     if reference.standard_deviation_rad.is_some() {
-        "The band is one standard deviation of the reference gait over its strides."
+        "The band shows one standard deviation on either side of the mean."
     } else {
         "The reference gait has no standard deviation, so there is no band."
     }

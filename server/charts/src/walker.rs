@@ -1,4 +1,4 @@
-//! The walker of a gait as a figure: a body with limbs, a prosthesis, muscles and ground reaction forces.
+//! The walker of a gait: a body with limbs, a prosthesis, muscles and ground reaction forces.
 //!
 //! Every part has a fixed outline in the frame of its segment, so that a pose is one transformation for each segment.
 //! The script of the pages and the animation for download move the same outlines.

@@ -18,11 +18,11 @@ for k = 1:study.number_of_trials
     trial = request(address, token, 'POST', ['/studies/' study.id '/ask'], struct('script', 'treadmill'));
     rmse = measure(trial.action);
     if isnan(rmse)
-        outcome = struct('outcome', 'not_converged', 'reason', 'the walker stumbled');
+        result = struct('label', 'not_converged', 'reason', 'the walker stumbled');
     else
-        outcome = struct('outcome', 'converged', 'gait_rmse_rad', rmse);
+        result = struct('label', 'converged', 'gait_rmse_rad', rmse);
     end
-    told = request(address, token, 'POST', ['/trials/' trial.id '/tell'], outcome);
+    told = request(address, token, 'POST', ['/trials/' trial.id '/tell'], result);
     fprintf('trial %d: %s, %.4f rad\n', told.number, told.state, rmse);
 end
 best = request(address, token, 'GET', ['/studies/' study.id '/trials?state=converged&sort=gait_rmse_rad&limit=1']);

@@ -33,9 +33,9 @@ def main() -> None:
             raise
         rmse = measure(trial["action"])
         if rmse is None:
-            client.tell_outcome(trial["id"], outcome="not_converged", reason="the walker stumbled")
+            client.tell_result(trial["id"], label="not_converged", reason="the walker stumbled")
         else:
-            client.tell_outcome(trial["id"], outcome="converged", gait_rmse_rad=rmse)
+            client.tell_result(trial["id"], label="converged", gait_rmse_rad=rmse)
         print(f"trial {trial['number']}: {'stumbled' if rmse is None else f'{rmse:.4f} rad'}")
     study = client.wait(study)
     best = list(client.list_study_history(study["id"]))[-1]

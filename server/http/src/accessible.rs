@@ -12,8 +12,8 @@ use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
 use gaitwright_store::{
     AssessmentId, BackupId, Connection, DeviceId, FeedbackId, LabSessionId, MeasurementFileId, MemberId,
-    ReferenceGaitId, SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId, assessments,
-    consents, feedback, lab_sessions, measurement_files, members, trials,
+    ReferenceGaitId, SessionId, StoreError, StoreResult, StudyId, SubjectId, TokenId, TrialId, UserId,
+    accessible_studies, assessments, consents, feedback, lab_sessions, measurement_files, members, trials,
 };
 use serde::Deserialize;
 use std::fmt::Display;
@@ -117,7 +117,7 @@ async fn located<T: Located>(db: &mut Connection, reach: Reach, id: T) -> Result
         found => found?,
     };
     if let Some(study) = study
-        && !members::reaches(db, reach, study).await?
+        && !accessible_studies::reaches(db, reach, study).await?
     {
         return Err(missing().into());
     }

@@ -131,7 +131,7 @@ pub(crate) fn source(row: &FeedbackRow) -> &'static str {
 /// The source of an answer that no rater gave.
 pub(crate) fn source_name(source: Source) -> &'static str {
     match source {
-        Source::Convergence => "the solver",
+        Source::Evaluation => "the evaluation",
         Source::GaitRmse => "Gait RMSE",
         Source::Subject => "the subject",
         Source::Clinician => "a clinician",

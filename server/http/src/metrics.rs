@@ -36,7 +36,7 @@ pub(super) async fn get(_: Authorized<Read>, State(app): State<AppState>) -> Res
     for (name, label, meaning, rows) in [
         ("gaitwright_studies", "state", "Studies by state", &totals.studies),
         ("gaitwright_trials", "state", "Trials by state", &totals.trials),
-        ("gaitwright_jobs", "state", "Solves by state", &totals.jobs),
+        ("gaitwright_solve_jobs", "state", "Solves by state", &totals.solve_jobs),
     ] {
         line(&mut text, format_args!("# HELP {name} {meaning}\n# TYPE {name} gauge"));
         for (state, count) in rows {

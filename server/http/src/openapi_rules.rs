@@ -122,7 +122,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             let reason = json!({ "required": ["reason"], "properties": { "reason": { "pattern": r"\S" } } });
             let rmse =
                 json!({ "required": ["gait_rmse_rad"], "properties": { "gait_rmse_rad": { "type": "number" } } });
-            tell.insert("if".to_owned(), json!({ "properties": { "outcome": { "const": "converged" } } }));
+            tell.insert("if".to_owned(), json!({ "properties": { "label": { "const": "converged" } } }));
             tell.insert("then".to_owned(), rmse);
             tell.insert("else".to_owned(), reason);
         }

@@ -54,7 +54,8 @@ pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error>
     let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
     match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {
         Some(c) => {
-            Err(Error::invalid(field, c.escape_unicode().to_string(), "printable characters and line breaks only"))
+            let is = format!("text with the character {}", c.escape_unicode());
+            Err(FieldError::described(field, &is, "text with printable characters and line breaks only").into())
         }
         None => Ok(()),
     }

@@ -185,7 +185,7 @@ pub fn run() -> ExitCode {
         Command::Emg(emg) => emg.run().map(|()| CommandEnd::Done),
         Command::Convert(convert) => convert.run().map(|()| CommandEnd::Done),
         Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| CommandEnd::Done),
-        Command::Config(_) => settings.show().map(|()| CommandEnd::Done),
+        Command::Config(_) => config::ConfigCommand::run(&settings).map(|()| CommandEnd::Done),
         Command::Doctor(doctor) => {
             let healthy = runtime.block_on(doctor.run(&settings));
             healthy.map(|healthy| if healthy { CommandEnd::Done } else { CommandEnd::Failed })

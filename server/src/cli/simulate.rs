@@ -17,7 +17,7 @@ pub(super) struct SimulateCommand {
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
     /// Number of simulated walks with random disturbances on each kind of ground.
-    #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().walks, value_parser = walks, allow_negative_numbers = true)]
+    #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().simulated_walks, value_parser = walks, allow_negative_numbers = true)]
     walks: u32,
     /// Largest height of bumps and depth of dips in the ground, 0 (level) to 50 mm (default: 0, 5 and 10 in turn).
     #[arg(long, value_name = "MILLIMETRES", value_parser = ground, allow_negative_numbers = true)]
@@ -31,7 +31,7 @@ pub(super) struct SimulateCommand {
 }
 
 fn walks(text: &str) -> Result<u32, String> {
-    whole(text, 1, ExecutionOptions::MOST_WALKS)
+    whole(text, 1, ExecutionOptions::MOST_SIMULATED_WALKS)
 }
 
 /// A height in millimetres, because the error of the library names its own field, in metres.
@@ -47,7 +47,7 @@ impl SimulateCommand {
     /// Simulates the walks. Falls are a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let mut options = ExecutionOptions {
-            walks: self.walks,
+            simulated_walks: self.walks,
             seed: self.seed,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             ..ExecutionOptions::default()

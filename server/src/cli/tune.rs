@@ -130,6 +130,9 @@ impl TuneCommand {
             }
             _ => data("no trial found a gait")?,
         }
+        if !summary.never_active.is_empty() {
+            data(&format!("bounds that were not active in any gait: {}", summary.never_active.join(", ")))?;
+        }
         Ok(())
     }
 }

@@ -19,7 +19,7 @@ const TABLES: [(&str, &str); 31] = [
     ("trials", "study_id = ? order by number"),
     ("gaits", "trial_id in (select id from trials where study_id = ?)"),
     ("explanation_requests", "trial_id in (select id from trials where study_id = ?)"),
-    ("jobs", "trial_id in (select id from trials where study_id = ?)"),
+    ("solve_jobs", "trial_id in (select id from trials where study_id = ?)"),
     ("attempts", "trial_id in (select id from trials where study_id = ?)"),
     ("feedback", "study_id = ? order by seq"),
     ("feedback_retractions", "feedback_seq in (select seq from feedback where study_id = ?)"),
@@ -198,7 +198,7 @@ impl Unpacking {
                     }
                 }
             }
-            "jobs" if row.text("state") == Some("leased") => {
+            "solve_jobs" if row.text("state") == Some("leased") => {
                 row.set("state", text("queued"));
                 row.set("worker", Cell::Null);
                 row.set("lease_until", Cell::Null);
@@ -233,9 +233,9 @@ impl Unpacking {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn trial_unlike_its_job(db: &mut Connection) -> StoreResult<Option<u32>> {
+pub async fn trial_unlike_its_solve_job(db: &mut Connection) -> StoreResult<Option<u32>> {
     Ok(sqlx::query_scalar(
-        "select t.number from trials t left join jobs j on j.trial_id = t.id \
+        "select t.number from trials t left join solve_jobs j on j.trial_id = t.id \
          where (t.script is null and t.state in ('queued', 'running')) <> coalesce(j.state <> 'done', 0) \
          order by t.number limit 1",
     )

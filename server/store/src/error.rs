@@ -99,8 +99,8 @@ pub enum StoreError {
     /// The newest rows are missing: the record was truncated, or is an older copy.
     #[error(
         "The record {} ends with row {found} of {table}, but its anchor {} lists row {seen}, so acknowledged changes are missing. \
-         Nothing was changed. Put the missing log or a newer copy in place. If this copy \
-         is the right one, restore it (`gaitwright restore`); to verify it without a second anchor, give an empty name (`--anchor ''`).",
+         Nothing was changed. Put the missing log or a newer copy in place. If this record \
+         is the right one, restore a copy of it (`gaitwright restore COPY`); to verify it without a second anchor, give an empty name (`--anchor ''`).",
         record.display(), anchor.display()
     )]
     CutOff {
@@ -118,7 +118,7 @@ pub enum StoreError {
     /// A row differs from the one that the anchor lists.
     #[error(
         "Row {seq} of {table} in the record {} differs from the one that its anchor {} lists: its history was rewritten, or this \
-         is another record. Nothing was changed. If this record is the right one, restore it (`gaitwright restore`); \
+         is another record. Nothing was changed. If this record is the right one, restore a copy of it (`gaitwright restore COPY`); \
          to verify it without a second anchor, give an empty name (`--anchor ''`).",
         record.display(), anchor.display()
     )]
@@ -164,8 +164,8 @@ pub enum StoreError {
     },
     /// A folder has the scheduled backups of another record.
     #[error(
-        "The backup folder {} belongs to the record {record}; each record must have a folder of its own. If the record was \
-         moved from there, delete {}.",
+        "The backup folder {} belongs to the record {record}; each record must have a folder of its own. If this record \
+         used to be at that path, delete {}.",
         folder.display(), claim.display()
     )]
     FolderOfOther {

@@ -1,7 +1,7 @@
 //! Stored infeasibility explanations, and requests for them.
 
+use super::accessible_studies::{reach_values, reached};
 use super::audit::Actor;
-use super::members::{reach_values, reached};
 use super::{Connection, Instant, StoreResult, StudyId, TrialId, json_columns, now};
 use crate::accessible_studies::Reach;
 use gait_optimizer::explanation::Explanation;

@@ -91,8 +91,8 @@ identifier!(
     FeedbackId
 );
 identifier!(
-    /// Identifier of a job.
-    JobId
+    /// Identifier of a solve job.
+    SolveJobId
 );
 identifier!(
     /// Identifier of a backup.

@@ -1,9 +1,9 @@
 //! Stored lab sessions and their progress. The order of the gaits is an allocation (`super::allocations`).
 
+use super::accessible_studies::{reach_values, reached};
 use super::allocations::{self, SessionAllocation};
 use super::audit::Actor;
 use super::lab_answers::{self, LabAnswer};
-use super::members::{reach_values, reached};
 use super::{Connection, Instant, LabSessionId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
 use sqlx::Row;

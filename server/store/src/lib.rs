@@ -41,7 +41,7 @@ pub mod gaits;
 mod id;
 pub mod idempotency;
 pub mod imports;
-pub mod jobs;
+
 mod json_columns;
 pub mod lab_answers;
 pub mod lab_sessions;
@@ -65,6 +65,7 @@ mod schema_versions;
 pub mod seals;
 pub mod sessions;
 pub mod sign_in_failures;
+pub mod solve_jobs;
 mod sqlite_file;
 pub mod studies;
 pub mod subjects;
@@ -85,8 +86,8 @@ pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use free_disk_space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use id::{
-    AssessmentId, BackupId, BlindPairId, ControllerFileDownloadId, DeviceId, EmgResultId, FeedbackId, JobId,
-    LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, StudyId,
+    AssessmentId, BackupId, BlindPairId, ControllerFileDownloadId, DeviceId, EmgResultId, FeedbackId, LabSessionId,
+    MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, SolveJobId, StudyId,
     SubjectId, TokenId, TrialId, UserId,
 };
 pub use schema_versions::SCHEMA_VERSION;

@@ -1,36 +1,12 @@
 //! Stored members of studies, and restrictions of studies to them.
 
 use super::{Connection, Instant, MemberId, StoreError, StoreResult, StudyId, now};
-use crate::accessible_studies::{Principal, Reach};
+use crate::accessible_studies::Principal;
 use crate::rights::Role;
 use serde::{Deserialize, Serialize};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
 use utoipa::ToSchema;
-
-/// SQL condition that a caller can access the study of a column. `?1`, `?2` and `?3` are the values of [`reach_values`].
-macro_rules! reached {
-    ($study:literal) => {
-        concat!(
-            "(?1 or ",
-            $study,
-            " in (select study_id from current_study_members where principal = ?3) or (?2 and ",
-            $study,
-            " not in (select study_id from restricted_studies)))"
-        )
-    };
-}
-pub(super) use reached;
-
-/// The first three values of a query with [`reached`]: whether every study is accessible, whether open ones are, and
-/// whose memberships count.
-pub(super) fn reach_values(reach: Reach) -> (bool, bool, Option<String>) {
-    let principal = reach.principal().map(|principal| match principal {
-        Principal::User(id) => id.to_string(),
-        Principal::Token(id) => id.to_string(),
-    });
-    (reach.is_every(), reach.is_open(), principal)
-}
 
 /// Kind of member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -63,37 +39,6 @@ pub struct Member {
 
 /// The message of the trigger that refuses a second membership.
 pub const MEMBER_ALREADY: &str = "already a member of this study";
-
-/// Whether a caller can access a study. `false` for a study that does not exist.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn reaches(db: &mut Connection, reach: Reach, study: StudyId) -> StoreResult<bool> {
-    let (every, open, principal) = reach_values(reach);
-    let found = sqlx::query(concat!("select 1 from studies s where s.id = ?4 and ", reached!("s.id")))
-        .bind(every)
-        .bind(open)
-        .bind(principal)
-        .bind(study)
-        .fetch_optional(db)
-        .await?;
-    Ok(found.is_some())
-}
-
-/// Whether a caller can access any study.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn reaches_any(db: &mut Connection, reach: Reach) -> StoreResult<bool> {
-    let (every, open, principal) = reach_values(reach);
-    let found = sqlx::query(concat!("select 1 from studies s where ", reached!("s.id"), " limit 1"))
-        .bind(every)
-        .bind(open)
-        .bind(principal)
-        .fetch_optional(db)
-        .await?;
-    Ok(found.is_some())
-}
 
 const MEMBERS: &str = "select m.*, coalesce(u.name, t.name) as name, u.role as role from study_members m \
                        left join users u on u.id = m.user_id left join tokens t on t.id = m.token_id ";

@@ -71,6 +71,7 @@ mod tests {
     use super::super::schema_versions::SCHEMA_VERSION;
     use super::super::{Store, commit, consents, read_only, subjects};
     use super::*;
+    use std::ops::AddAssign;
     use tempfile::TempDir;
 
     /// A migration that the next version could have: it writes rows of a sealed table.
@@ -141,6 +142,111 @@ mod tests {
         }
         let copies = files(&folder).iter().filter(|name| name.contains(".v") || name.contains("copying")).count();
         assert_eq!(copies, 1, "{:?}", files(&folder));
+    }
+
+    /// A migration that writes every subject again, many times, so that a kill can meet it at any moment.
+    const LARGE: &str = "alter table subjects add column next text; \
+        create table copies (id integer primary key, of text not null, padding blob not null) strict; \
+        insert into copies (of, padding) select id, randomblob(400) from subjects, \
+            (with recursive n(i) as (select 1 union all select i + 1 from n where i < 100) select i from n); \
+        update subjects set next = 'x'; drop table copies;";
+    /// Subjects of the record that is migrated.
+    const SUBJECTS: u32 = 400;
+    /// How often the migration is killed.
+    const KILLS: u32 = 24;
+    /// Names the record to the child process of the test, which migrates it.
+    const CHILD: &str = "GAITWRIGHT_TEST_MIGRATES";
+
+    /// The child process of the next test; without its variable, this is no test.
+    #[tokio::test]
+    async fn child_migrates_the_record_that_it_is_given() {
+        let Some(database) = std::env::var_os(CHILD).map(PathBuf::from) else { return };
+        let migrated = pool(&database).await;
+        migrate(&migrated, &database, &with_next(LARGE)).await.unwrap();
+        migrated.close().await;
+    }
+
+    fn child(database: &Path) -> std::process::Child {
+        std::process::Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "migrations::tests::child_migrates_the_record_that_it_is_given"])
+            .env(CHILD, database)
+            .stdout(std::process::Stdio::null())
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap()
+    }
+
+    #[tokio::test]
+    async fn migration_that_is_killed_at_any_moment_has_happened_or_has_not() {
+        let (folder, old) = record().await;
+        let store = Store::open(&old).await.unwrap();
+        let mut writer = store.write().await.unwrap();
+        let body = gait_optimizer::Subject { height_m: 1.8, body_mass_kg: 70.0 };
+        for number in 1..SUBJECTS {
+            subjects::insert(&mut writer, &format!("S{}", number + 1), body, "").await.unwrap();
+        }
+        commit(writer).await.unwrap();
+        store.close().await;
+        // How long an undisturbed migration takes here.
+        let database = folder.path().join("killed.db");
+        let kept = path_with_suffix(&database, &format!(".v{SCHEMA_VERSION}"));
+        std::fs::copy(&old, &database).unwrap();
+        let begun = std::time::Instant::now();
+        assert!(child(&database).wait().unwrap().success());
+        let whole = begun.elapsed();
+        assert_eq!(versions(&database).await.last(), Some(&(SCHEMA_VERSION + 1)));
+
+        let (mut copied_before_kill, mut before, mut after) = (0, 0, 0);
+        for kill in 0..KILLS {
+            for file in files(&folder).iter().filter(|name| name.starts_with("killed.db")) {
+                std::fs::remove_file(folder.path().join(file)).unwrap();
+            }
+            std::fs::copy(&old, &database).unwrap();
+            let mut killed = child(&database);
+            // Spread over the whole migration, with an offset that no run shares.
+            let offset = f64::from(std::process::id() % 97) / 97.0;
+            tokio::time::sleep(whole.mul_f64((f64::from(kill) + offset) / f64::from(KILLS))).await;
+            killed.kill().unwrap();
+            killed.wait().unwrap();
+
+            let found = versions(&database).await;
+            let is_new = found.last() == Some(&(SCHEMA_VERSION + 1));
+            assert!(is_new || found.last() == Some(&SCHEMA_VERSION), "{found:?}");
+            let opened = pool(&database).await;
+            let columns: Vec<String> =
+                sqlx::query_scalar("select name from pragma_table_info('subjects')").fetch_all(&opened).await.unwrap();
+            let copies: Option<String> = sqlx::query_scalar("select name from sqlite_master where name = 'copies'")
+                .fetch_optional(&opened)
+                .await
+                .unwrap();
+            let rows: u32 = sqlx::query_scalar("select count(*) from subjects").fetch_one(&opened).await.unwrap();
+            assert_eq!((columns.contains(&"next".to_owned()), copies, rows), (is_new, None, SUBJECTS));
+            if is_new {
+                let written = "select count(*) from subjects where next = 'x'";
+                assert_eq!(sqlx::query_scalar::<_, u32>(written).fetch_one(&opened).await.unwrap(), SUBJECTS);
+            }
+            (if is_new { &mut after } else { &mut before }).add_assign(1);
+            // The copy gets its name only once it is whole, and the schema changes only once there is a copy.
+            assert!(kept.exists() || !is_new);
+            if kept.exists() {
+                verify::file(&kept, &[]).await.unwrap();
+                assert_eq!(versions(&kept).await.last(), Some(&SCHEMA_VERSION));
+                copied_before_kill += 1;
+            }
+            // The next start completes the migration.
+            if !is_new {
+                migrate(&opened, &database, &with_next(LARGE)).await.unwrap();
+            }
+            let mut db = opened.acquire().await.unwrap();
+            let sealed = seals::verify(&mut db).await.unwrap();
+            assert!(matches!(sealed, seals::SealCheck::Intact { .. }), "{sealed:?}");
+            let whole: u32 =
+                sqlx::query_scalar("select count(*) from subjects where next = 'x'").fetch_one(&mut *db).await.unwrap();
+            assert_eq!(whole, SUBJECTS);
+            drop(db);
+            opened.close().await;
+        }
+        assert!(before > 0, "{copied_before_kill} copies, {before} before, {after} after");
     }
 
     #[tokio::test]

@@ -1,4 +1,4 @@
-//! Totals of the record for metrics: studies, trials and jobs by state, and the size of the file.
+//! Totals of the record for metrics: studies, trials and solve jobs by state, and the size of the file.
 
 use super::{Connection, Instant, StoreResult, now};
 use sqlx::Row;
@@ -11,7 +11,7 @@ pub struct Totals {
     /// Trials by state.
     pub trials: Vec<(String, i64)>,
     /// Jobs by state.
-    pub jobs: Vec<(String, i64)>,
+    pub solve_jobs: Vec<(String, i64)>,
     /// Size of the file.
     pub bytes: i64,
     /// Waiting time of the oldest queued job, s.
@@ -27,12 +27,14 @@ pub async fn read(db: &mut Connection) -> StoreResult<Totals> {
         .fetch_one(&mut *db)
         .await?
         .try_get(0)?;
-    let oldest: Option<Instant> =
-        sqlx::query("select min(created_at) from jobs where state = 'queued'").fetch_one(&mut *db).await?.try_get(0)?;
+    let oldest: Option<Instant> = sqlx::query("select min(created_at) from solve_jobs where state = 'queued'")
+        .fetch_one(&mut *db)
+        .await?
+        .try_get(0)?;
     Ok(Totals {
         studies: by_state(db, "select state, count(*) from studies group by state").await?,
         trials: by_state(db, "select state, count(*) from trials group by state").await?,
-        jobs: by_state(db, "select state, count(*) from jobs group by state").await?,
+        solve_jobs: by_state(db, "select state, count(*) from solve_jobs group by state").await?,
         bytes,
         oldest_queued_seconds: oldest.map_or(0.0, |at| now().seconds_since(at)),
     })

@@ -242,7 +242,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     ),
     (
         "an open job of a trial that ended",
-        |r| r.first("jobs")["state"] = "queued".into(),
+        |r| r.first("solve_jobs")["state"] = "queued".into(),
         "its state contradicts its job",
     ),
     (
@@ -254,7 +254,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
         "a label turned",
         |r| {
             let label = r.table("feedback").into_iter().find(|row| row["kind"] == "label").unwrap();
-            label["category"] = (1 - label["category"].as_i64().unwrap()).into();
+            label["label"] = if label["label"] == "converged" { "not_converged" } else { "converged" }.into();
         },
         "does not match the trial state",
     ),
@@ -282,8 +282,8 @@ pub(super) const FORGERIES: [Forgery; 69] = [
     ),
     (
         "a preference from nowhere",
-        |r| of_source(r, "clinician")["source"] = "convergence".into(),
-        "a preference cannot have the source convergence",
+        |r| of_source(r, "clinician")["source"] = "evaluation".into(),
+        "the source of a preference cannot be evaluation",
     ),
     (
         "an answer by a name with spaces around it",
@@ -327,7 +327,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
                 f["id"] = "01900000-0000-7000-8000-000000000001".into();
                 f["kind"] = "suggestion".into();
                 f["source"] = "clinician".into();
-                f["category"] = Value::Null;
+                f["label"] = Value::Null;
                 f["suggested"] = 99_999_999.into();
             });
         },

@@ -39,7 +39,7 @@ async fn by_script(site: &Site) -> (StudyId, String) {
     let study = site.service.study(|new| (new.evaluation, new.number_of_trials) = (Evaluation::Script, 3)).await;
     let ask = async || site.service.post(&format!("/api/v1/studies/{study}/ask"), &json!({})).await.json();
     let trial = ask().await["id"].as_str().unwrap().to_owned();
-    let told = json!({"outcome": "converged", "gait_rmse_rad": 0.21});
+    let told = json!({"label": "converged", "gait_rmse_rad": 0.21});
     site.service.post(&format!("/api/v1/trials/{trial}/tell"), &told).await;
     // A trial that is being evaluated.
     ask().await;

@@ -22,14 +22,14 @@ pub struct Animation {
 }
 
 impl Animation {
-    /// The animation of a figure.
+    /// The animation of a walker.
     pub fn new(walker: GaitWalker) -> Self {
         Self { walker }
     }
 
     /// The poses of the stride.
-    pub(crate) fn figures(&self) -> &[StickFigure] {
-        &self.walker.figures
+    pub(crate) fn stick_figures(&self) -> &[StickFigure] {
+        &self.walker.stick_figures
     }
 
     /// Width and height.
@@ -49,10 +49,10 @@ impl Animation {
     /// The pose of each picture: the node nearest in time.
     fn pictures(&self) -> Vec<Pose<'_>> {
         let poses: Vec<Pose<'_>> = self.walker.poses().collect();
-        let end = poses.last().map_or(0.0, |pose| pose.figure.time_s);
+        let end = poses.last().map_or(0.0, |pose| pose.stick_figure.time_s);
         let nearest = |picture: usize| {
             let time = end * picture as f64 / (PICTURES - 1) as f64;
-            poses.iter().position(|pose| pose.figure.time_s >= time - 1e-9)
+            poses.iter().position(|pose| pose.stick_figure.time_s >= time - 1e-9)
         };
         let mut places: Vec<usize> = (0..PICTURES).filter_map(nearest).collect();
         places.dedup();
@@ -69,18 +69,18 @@ impl Animation {
         )?;
         let pictures = self.pictures();
         if let (Some(first), Some(last)) = (pictures.first(), pictures.last()) {
-            let seconds = (last.figure.time_s - first.figure.time_s).max(0.1);
-            let begin = first.figure.time_s;
+            let seconds = (last.stick_figure.time_s - first.stick_figure.time_s).max(0.1);
+            let begin = first.stick_figure.time_s;
             let times: Vec<String> =
-                pictures.iter().map(|pose| format!("{:.4}", (pose.figure.time_s - begin) / seconds)).collect();
+                pictures.iter().map(|pose| format!("{:.4}", (pose.stick_figure.time_s - begin) / seconds)).collect();
             let clock = PictureTimes { seconds, times: times.join(";") };
             self.draw_ground(svg, &clock)?;
-            let figures: Vec<&StickFigure> = pictures.iter().map(|pose| pose.figure).collect();
-            for part in parts(first.figure) {
+            let stick_figures: Vec<&StickFigure> = pictures.iter().map(|pose| pose.stick_figure).collect();
+            for part in parts(first.stick_figure) {
                 if part.class == "right" {
                     self.draw_muscles(svg, &pictures, &clock, true)?;
                 }
-                draw_moving(svg, part.class, &part.outline, &placements(part.segment, &figures), &clock)?;
+                draw_moving(svg, part.class, &part.outline, &placements(part.segment, &stick_figures), &clock)?;
                 if part.class == "right" {
                     self.draw_muscles(svg, &pictures, &clock, false)?;
                 }
@@ -120,10 +120,10 @@ impl Animation {
         let Some(first) = pictures.first().filter(|_| self.walker.has_muscles()) else { return Ok(()) };
         let peaks = self.walker.peaks();
         for (muscle, path) in
-            muscle_paths(first.figure).iter().enumerate().filter(|(muscle, _)| is_left(*muscle) == of_left)
+            muscle_paths(first.stick_figure).iter().enumerate().filter(|(muscle, _)| is_left(*muscle) == of_left)
         {
             let share = |pose: &Pose<'_>| pose.activations.map_or(0.0, |now| share_of_peak(now[muscle], peaks[muscle]));
-            let line = |pose: &Pose<'_>| muscle_line(path, pose.figure);
+            let line = |pose: &Pose<'_>| muscle_line(path, pose.stick_figure);
             write!(
                 svg,
                 "<path class=\"muscle\" d=\"{}\" stroke-width=\"{:.1}\" stroke-opacity=\"{:.2}\">",
@@ -163,7 +163,7 @@ impl Animation {
     }
 }
 
-/// Units of the file per unit of the figure.
+/// Units of the file per unit of the walker.
 const SCALE: f64 = 3.0;
 
 /// When the pictures of the stride are shown.
@@ -204,8 +204,9 @@ impl PictureTimes {
 }
 
 /// The placements of a segment, with rotations that never jump by a whole turn.
-fn placements(segment: Segment, figures: &[&StickFigure]) -> Vec<Placement> {
-    let mut placements: Vec<Placement> = figures.iter().map(|figure| segment.placement(figure)).collect();
+fn placements(segment: Segment, stick_figures: &[&StickFigure]) -> Vec<Placement> {
+    let mut placements: Vec<Placement> =
+        stick_figures.iter().map(|stick_figure| segment.placement(stick_figure)).collect();
     for place in 1..placements.len() {
         let turns = ((placements[place - 1].degrees - placements[place].degrees) / 360.0).round();
         placements[place].degrees += 360.0 * turns;
@@ -242,13 +243,13 @@ mod tests {
     #[test]
     fn rotation_never_jumps_by_a_whole_turn() {
         let toe_at = |degrees: f64| {
-            let mut figure = standing();
+            let mut stick_figure = standing();
             let (sine, cosine) = degrees.to_radians().sin_cos();
-            figure.left.toe = [figure.left.heel[0] + 0.2 * cosine, figure.left.heel[1] - 0.2 * sine];
-            figure
+            stick_figure.left.toe = [stick_figure.left.heel[0] + 0.2 * cosine, stick_figure.left.heel[1] - 0.2 * sine];
+            stick_figure
         };
-        let figures: Vec<StickFigure> = [170.0, 179.0, 188.0, 197.0].map(toe_at).into();
-        let turned = placements(Segment::LeftFoot, &figures.iter().collect::<Vec<_>>());
+        let stick_figures: Vec<StickFigure> = [170.0, 179.0, 188.0, 197.0].map(toe_at).into();
+        let turned = placements(Segment::LeftFoot, &stick_figures.iter().collect::<Vec<_>>());
         for pair in turned.windows(2) {
             assert!((pair[1].degrees - pair[0].degrees - 9.0).abs() < 1e-6, "{turned:?}");
         }

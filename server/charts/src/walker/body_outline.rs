@@ -41,7 +41,7 @@ pub(super) struct Foot {
 }
 
 impl Lengths {
-    pub(super) fn of(figure: &StickFigure) -> Self {
+    pub(super) fn of(stick_figure: &StickFigure) -> Self {
         let between = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) * UNITS_PER_M;
         let foot = |ankle: [f64; 2], heel: [f64; 2], toe: [f64; 2]| {
             let sole = between(heel, toe).max(1e-6);
@@ -50,12 +50,12 @@ impl Lengths {
             let along = (sole * sole + behind - between(ankle, toe).powi(2)) / (2.0 * sole);
             Foot { height: (behind - along * along).max(0.0).sqrt(), behind: along, ahead: sole - along }
         };
-        let (left, right) = (&figure.left, &figure.right);
+        let (left, right) = (&stick_figure.left, &stick_figure.right);
         Self {
-            trunk: between(figure.hip, figure.shoulder),
-            thigh: between(figure.hip, left.knee),
+            trunk: between(stick_figure.hip, stick_figure.shoulder),
+            thigh: between(stick_figure.hip, left.knee),
             shank: between(left.knee, left.ankle),
-            right_thigh: between(figure.hip, right.knee),
+            right_thigh: between(stick_figure.hip, right.knee),
             right_shank: between(right.knee, right.ankle),
             left_foot: foot(left.ankle, left.heel, left.toe),
             right_foot: foot(right.ankle, right.heel, right.toe),
@@ -68,9 +68,9 @@ impl Lengths {
     }
 }
 
-/// The parts of the body in a figure, in the order in which they are drawn: the right leg is nearest.
-pub(crate) fn parts(figure: &StickFigure) -> Vec<BodyPart> {
-    let lengths = Lengths::of(figure);
+/// The parts of the body in a walker, in the order in which they are drawn: the right leg is nearest.
+pub(crate) fn parts(stick_figure: &StickFigure) -> Vec<BodyPart> {
+    let lengths = Lengths::of(stick_figure);
     let t = lengths.trunk;
     let human = lengths.residual_thigh();
     let part = |segment, class, outline| BodyPart { segment, class, outline };
@@ -89,8 +89,8 @@ pub(crate) fn parts(figure: &StickFigure) -> Vec<BodyPart> {
 }
 
 /// Two legs without a prosthesis, for a reference gait. Both have the size of the left one.
-pub(super) fn human_parts(figure: &StickFigure) -> Vec<BodyPart> {
-    let lengths = Lengths::of(figure);
+pub(super) fn human_parts(stick_figure: &StickFigure) -> Vec<BodyPart> {
+    let lengths = Lengths::of(stick_figure);
     let t = lengths.trunk;
     let leg = |class, [thigh_of, shank_of, foot_of]: [Segment; 3]| {
         [

@@ -1,4 +1,4 @@
-//! The figure of a gait on a page: one pose, with everything that the script needs to move it.
+//! The walker of a gait on a page: one pose, with everything that the script needs to move it.
 
 use super::body_outline::{BodyPart, human_parts, parts};
 use super::muscle_paths::{MusclePath, is_left, muscle_paths};
@@ -23,11 +23,11 @@ const LEAST_FORCE_N: f64 = 10.0;
 /// Number of instants of a reference gait; the last one is the first of the next stride.
 const GHOST_INSTANTS: usize = 51;
 
-/// A gait at its nodes, as a figure is drawn from it.
+/// A gait at its nodes, as the walker is drawn from it.
 #[derive(Debug, Clone)]
 pub struct GaitWalker {
     /// Poses by time.
-    pub(super) figures: Vec<StickFigure>,
+    pub(super) stick_figures: Vec<StickFigure>,
     /// Ground forces on left heel, left toe, right heel and right toe at each pose, N.
     forces: Vec<[[f64; 2]; 4]>,
     /// Activations of the muscles at each pose.
@@ -38,7 +38,7 @@ pub struct GaitWalker {
     ghost: Option<Ghost>,
 }
 
-/// A second figure behind the first one.
+/// A second walker behind the first one.
 #[derive(Debug, Clone)]
 pub enum Ghost {
     /// The reference gait on the body of the subject, over one stride.
@@ -71,15 +71,15 @@ impl Ghost {
     }
 }
 
-/// The figure at one instant.
+/// The walker at one instant.
 pub(super) struct Pose<'a> {
-    pub(super) figure: &'a StickFigure,
+    pub(super) stick_figure: &'a StickFigure,
     pub(super) forces: &'a [[f64; 2]; 4],
     pub(super) activations: Option<&'a [f64; 10]>,
 }
 
 impl GaitWalker {
-    /// The figure of a gait.
+    /// The walker of a gait.
     ///
     /// # Errors
     /// [`ModelError`] if subject or device of the gait is invalid.
@@ -87,7 +87,7 @@ impl GaitWalker {
         let points = points(gait);
         let four = |f: &[f64; 8]| [[f[0], f[1]], [f[2], f[3]], [f[4], f[5]], [f[6], f[7]]];
         Ok(Self {
-            figures: stick_figures(gait)?,
+            stick_figures: stick_figures(gait)?,
             forces: points.iter().map(|point| four(&point.forces)).collect(),
             activations: points.iter().map(|point| point.activation.copied()).collect(),
             weight_n: gait.subject.body_mass_kg * GRAVITY,
@@ -96,38 +96,39 @@ impl GaitWalker {
         })
     }
 
-    /// With a second figure behind it, which is hidden until a script shows it.
+    /// With a second walker behind it, which is hidden until a script shows it.
     #[must_use]
     pub fn with_ghost(mut self, ghost: Ghost) -> Self {
         self.ghost = Some(ghost);
         self
     }
 
-    /// This gait as the second figure of another one.
+    /// This gait as the second walker beside another one.
     pub fn as_ghost(&self) -> Ghost {
-        Ghost::OtherGait(self.figures.first().copied())
+        Ghost::OtherGait(self.stick_figures.first().copied())
     }
 
     /// Left edge, top, width and height of the drawing.
     pub(super) fn view_box(&self) -> [f64; 4] {
-        let top = |figure: &StickFigure| {
-            let up = |axis: usize| TOP_OF_HEAD * (figure.shoulder[axis] - figure.hip[axis]);
-            figure.hip[1] + up(0).hypot(up(1))
+        let top = |stick_figure: &StickFigure| {
+            let up = |axis: usize| TOP_OF_HEAD * (stick_figure.shoulder[axis] - stick_figure.hip[axis]);
+            stick_figure.hip[1] + up(0).hypot(up(1))
         };
-        let reach = |figure: &StickFigure| {
-            let feet = [&figure.left, &figure.right].into_iter().flat_map(|leg| [leg.ankle, leg.heel, leg.toe]);
-            feet.map(|place| (place[0] - figure.hip[0]).abs()).fold(0.0, f64::max)
+        let reach = |stick_figure: &StickFigure| {
+            let feet =
+                [&stick_figure.left, &stick_figure.right].into_iter().flat_map(|leg| [leg.ankle, leg.heel, leg.toe]);
+            feet.map(|place| (place[0] - stick_figure.hip[0]).abs()).fold(0.0, f64::max)
         };
         let most = |of: &dyn Fn(&StickFigure) -> f64| {
-            self.figures.iter().map(of).filter(|value| value.is_finite()).fold(0.5, f64::max) * UNITS_PER_M
+            self.stick_figures.iter().map(of).filter(|value| value.is_finite()).fold(0.5, f64::max) * UNITS_PER_M
         };
         let (top, half) = ((most(&top) + ABOVE).round(), (most(&reach) + BESIDE).round());
         [-half, -top, 2.0 * half, top + BELOW]
     }
 
     pub(super) fn poses(&self) -> impl Iterator<Item = Pose<'_>> {
-        self.figures.iter().zip(&self.forces).enumerate().map(|(place, (figure, forces))| Pose {
-            figure,
+        self.stick_figures.iter().zip(&self.forces).enumerate().map(|(place, (stick_figure, forces))| Pose {
+            stick_figure,
             forces,
             activations: self.activations.as_ref().and_then(|all| all.get(place)),
         })
@@ -148,7 +149,7 @@ impl GaitWalker {
         self.weight_n / BODY_WEIGHT
     }
 
-    /// The figure at right heel strike as an SVG element.
+    /// The walker at right heel strike as an SVG element.
     pub fn svg(&self, label: &str) -> String {
         let mut svg = String::with_capacity(16 * 1024);
         // Writing to a String cannot fail.
@@ -167,17 +168,17 @@ impl GaitWalker {
         write!(svg, "<path class=\"ground\" d=\"M-999 0H999\"/><g data-ground></g>")?;
         let Some(pose) = self.poses().next() else { return write!(svg, "</svg>") };
         match &self.ghost {
-            Some(Ghost::Reference(figures)) => {
-                write!(svg, "<g class=\"ghost\" data-ghost=\"{}\" visibility=\"hidden\">", millimetres(figures))?;
-                for part in figures.first().map(human_parts).unwrap_or_default() {
-                    draw_part(svg, &part, pose.figure)?;
+            Some(Ghost::Reference(stick_figures)) => {
+                write!(svg, "<g class=\"ghost\" data-ghost=\"{}\" visibility=\"hidden\">", millimetres(stick_figures))?;
+                for part in stick_figures.first().map(human_parts).unwrap_or_default() {
+                    draw_part(svg, &part, pose.stick_figure)?;
                 }
                 write!(svg, "</g>")?;
             }
             Some(Ghost::OtherGait(other)) => {
                 write!(svg, "<g class=\"ghost\" data-ghost visibility=\"hidden\">")?;
                 for part in other.as_ref().map(parts).unwrap_or_default() {
-                    draw_part(svg, &part, pose.figure)?;
+                    draw_part(svg, &part, pose.stick_figure)?;
                 }
                 write!(svg, "</g>")?;
             }
@@ -185,7 +186,7 @@ impl GaitWalker {
         }
         let peaks = self.peaks();
         let muscles = |svg: &mut String, of_left: bool| -> std::fmt::Result {
-            let paths = if self.has_muscles() { muscle_paths(pose.figure) } else { Default::default() };
+            let paths = if self.has_muscles() { muscle_paths(pose.stick_figure) } else { Default::default() };
             for (muscle, path) in
                 paths.iter().enumerate().filter(|(muscle, path)| is_left(*muscle) == of_left && !path.is_empty())
             {
@@ -196,7 +197,7 @@ impl GaitWalker {
                     "<path class=\"muscle\" data-muscle=\"{muscle}\" data-peak=\"{:.4}\" data-via=\"{}\" d=\"{}\" stroke-width=\"{:.1}\" stroke-opacity=\"{:.2}\"><title>{}</title></path>",
                     peaks[muscle],
                     via.collect::<Vec<_>>().join(","),
-                    muscle_line(path, pose.figure),
+                    muscle_line(path, pose.stick_figure),
                     muscle_width(share),
                     muscle_opacity(share),
                     MUSCLES[muscle]
@@ -205,12 +206,12 @@ impl GaitWalker {
             Ok(())
         };
         write!(svg, "<g data-body>")?;
-        for part in parts(pose.figure) {
+        for part in parts(pose.stick_figure) {
             // The right leg is in front of the muscles of the left one; its muscles end in the socket.
             if part.class == "right" {
                 muscles(svg, true)?;
             }
-            draw_part(svg, &part, pose.figure)?;
+            draw_part(svg, &part, pose.stick_figure)?;
             if part.class == "right" {
                 muscles(svg, false)?;
             }
@@ -227,11 +228,11 @@ impl GaitWalker {
         let [left_heel, left_toe, right_heel, right_toe] = *pose.forces;
         let arrow = |leg: &LegPoints, heel: [f64; 2], toe: [f64; 2]| {
             ground_reaction(leg, heel, toe).map_or_else(String::new, |(place, force)| {
-                let x = (place - pose.figure.hip[0]) * UNITS_PER_M;
+                let x = (place - pose.stick_figure.hip[0]) * UNITS_PER_M;
                 arrow(x, force[0] / self.force_scale_n(), -force[1] / self.force_scale_n())
             })
         };
-        [arrow(&pose.figure.left, left_heel, left_toe), arrow(&pose.figure.right, right_heel, right_toe)]
+        [arrow(&pose.stick_figure.left, left_heel, left_toe), arrow(&pose.stick_figure.right, right_heel, right_toe)]
     }
 }
 
@@ -268,18 +269,18 @@ pub(super) fn muscle_opacity(share: f64) -> f64 {
 }
 
 /// The `d` of a muscle.
-pub(super) fn muscle_line(path: &MusclePath, figure: &StickFigure) -> String {
+pub(super) fn muscle_line(path: &MusclePath, stick_figure: &StickFigure) -> String {
     let mut line = String::new();
     for (place, (segment, point)) in path.iter().enumerate() {
-        let [x, y] = segment.placement(figure).applied(*point);
+        let [x, y] = segment.placement(stick_figure).applied(*point);
         // Writing to a String cannot fail.
         let _ = write!(line, "{}{x:.1} {y:.1}", if place == 0 { 'M' } else { 'L' });
     }
     line
 }
 
-pub(super) fn draw_part(svg: &mut String, part: &BodyPart, figure: &StickFigure) -> std::fmt::Result {
-    let (segment, place) = (part.segment.name(), part.segment.placement(figure).transform());
+pub(super) fn draw_part(svg: &mut String, part: &BodyPart, stick_figure: &StickFigure) -> std::fmt::Result {
+    let (segment, place) = (part.segment.name(), part.segment.placement(stick_figure).transform());
     write!(
         svg,
         "<path class=\"{}\" data-segment=\"{segment}\" transform=\"{place}\" d=\"{}\"/>",
@@ -287,15 +288,16 @@ pub(super) fn draw_part(svg: &mut String, part: &BodyPart, figure: &StickFigure)
     )
 }
 
-/// The joints of figures in mm, hip first: figures separated by semicolons.
-fn millimetres(figures: &[StickFigure]) -> String {
-    let mut text = String::with_capacity(figures.len() * 100);
-    for (place, figure) in figures.iter().enumerate() {
+/// The joints of stick figures in mm, hip first, with semicolons between stick figures.
+fn millimetres(stick_figures: &[StickFigure]) -> String {
+    let mut text = String::with_capacity(stick_figures.len() * 100);
+    for (place, stick_figure) in stick_figures.iter().enumerate() {
         if place > 0 {
             text.push(';');
         }
-        let (l, r) = (&figure.left, &figure.right);
-        let joints = [figure.hip, figure.shoulder, l.knee, l.ankle, l.heel, l.toe, r.knee, r.ankle, r.heel, r.toe];
+        let (l, r) = (&stick_figure.left, &stick_figure.right);
+        let joints =
+            [stick_figure.hip, stick_figure.shoulder, l.knee, l.ankle, l.heel, l.toe, r.knee, r.ankle, r.heel, r.toe];
         for (place, value) in joints.iter().flatten().enumerate() {
             // Writing to a String cannot fail.
             let _ = write!(text, "{}{:.0}", if place == 0 { "" } else { " " }, value * 1000.0);
@@ -311,7 +313,7 @@ mod tests {
 
     fn on_both_feet() -> GaitWalker {
         GaitWalker {
-            figures: vec![standing()],
+            stick_figures: vec![standing()],
             forces: vec![[[0.0, 300.0], [0.0, 100.0], [0.0, 0.0], [40.0, 400.0]]],
             activations: Some(vec![[0.2; 10]]),
             weight_n: 800.0,
@@ -322,9 +324,9 @@ mod tests {
 
     #[test]
     fn force_is_drawn_at_the_centre_of_pressure_and_to_scale() {
-        let figure = on_both_feet();
-        let pose = figure.poses().next().unwrap();
-        let [left, right] = figure.arrows(&pose);
+        let walker = on_both_feet();
+        let pose = walker.poses().next().unwrap();
+        let [left, right] = walker.arrows(&pose);
         // A quarter of the way from heel (-6) to toe (15), half a body weight long.
         assert!(left.starts_with("M-0.8 0L-0.8 -25.0M"), "{left}");
         assert!(right.starts_with("M15.0 0L17.5 -25.0M"), "{right}");
@@ -332,14 +334,14 @@ mod tests {
 
     #[test]
     fn foot_in_swing_has_no_force() {
-        let mut figure = on_both_feet();
-        figure.forces[0][0] = [0.0; 2];
-        figure.forces[0][1] = [0.0; 2];
-        assert_eq!(figure.arrows(&figure.poses().next().unwrap())[0], "");
+        let mut walker = on_both_feet();
+        walker.forces[0][0] = [0.0; 2];
+        walker.forces[0][1] = [0.0; 2];
+        assert_eq!(walker.arrows(&walker.poses().next().unwrap())[0], "");
     }
 
     #[test]
-    fn figure_shows_body_muscles_and_forces_without_scripts() {
+    fn walker_shows_body_muscles_and_forces_without_scripts() {
         let svg = on_both_feet().svg("A <person>");
         assert!(svg.contains("aria-label=\"A &lt;person&gt;\"") && !svg.contains("NaN"), "{svg}");
         for (what, count) in [("data-muscle=", 10), ("data-force=", 2), ("class=\"device\"", 3), ("data-segment=", 10)]
@@ -352,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn figure_leaves_room_for_the_head() {
+    fn walker_leaves_room_for_the_head() {
         let [_, top, _, height] = on_both_feet().view_box();
         // The head ends 1.745 m above the ground.
         assert_eq!((top, height), (-178.0, 200.0));

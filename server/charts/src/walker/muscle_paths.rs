@@ -17,8 +17,8 @@ pub(super) fn is_left(muscle: usize) -> bool {
 }
 
 /// The paths in the order of [`MUSCLES`].
-pub(super) fn muscle_paths(figure: &StickFigure) -> [MusclePath; 10] {
-    let lengths = Lengths::of(figure);
+pub(super) fn muscle_paths(stick_figure: &StickFigure) -> [MusclePath; 10] {
+    let lengths = Lengths::of(stick_figure);
     let t = lengths.trunk;
     let trunk = |x: f64, up: f64| (Segment::Trunk, [x * t, -up * t]);
     let thigh = |x: f64, along: f64| (Segment::LeftThigh, [x * t, along * lengths.thigh]);

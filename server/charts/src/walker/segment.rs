@@ -40,25 +40,25 @@ impl Segment {
 
     /// The origin of the frame, the two joints that direct it, and the direction from the first to the second one at
     /// rest: up, down or forward, in degrees clockwise from forward.
-    fn frame(self, figure: &StickFigure) -> ([f64; 2], [f64; 2], [f64; 2], f64) {
-        let (left, right) = (&figure.left, &figure.right);
+    fn frame(self, stick_figure: &StickFigure) -> ([f64; 2], [f64; 2], [f64; 2], f64) {
+        let (left, right) = (&stick_figure.left, &stick_figure.right);
         match self {
-            Self::Trunk => (figure.hip, figure.hip, figure.shoulder, -90.0),
-            Self::LeftThigh => (figure.hip, figure.hip, left.knee, 90.0),
+            Self::Trunk => (stick_figure.hip, stick_figure.hip, stick_figure.shoulder, -90.0),
+            Self::LeftThigh => (stick_figure.hip, stick_figure.hip, left.knee, 90.0),
             Self::LeftShank => (left.knee, left.knee, left.ankle, 90.0),
             Self::LeftFoot => (left.ankle, left.heel, left.toe, 0.0),
-            Self::RightThigh => (figure.hip, figure.hip, right.knee, 90.0),
+            Self::RightThigh => (stick_figure.hip, stick_figure.hip, right.knee, 90.0),
             Self::RightShank => (right.knee, right.knee, right.ankle, 90.0),
             Self::RightFoot => (right.ankle, right.heel, right.toe, 0.0),
         }
     }
 
     /// Where the segment is in a drawing whose origin is on the ground below the hip.
-    pub(crate) fn placement(self, figure: &StickFigure) -> Placement {
-        let (origin, from, to, rest) = self.frame(figure);
+    pub(crate) fn placement(self, stick_figure: &StickFigure) -> Placement {
+        let (origin, from, to, rest) = self.frame(stick_figure);
         let degrees = (from[1] - to[1]).atan2(to[0] - from[0]).to_degrees() - rest;
         Placement {
-            x: (origin[0] - figure.hip[0]) * UNITS_PER_M,
+            x: (origin[0] - stick_figure.hip[0]) * UNITS_PER_M,
             y: -origin[1] * UNITS_PER_M,
             degrees: (degrees + 180.0).rem_euclid(360.0) - 180.0,
         }
@@ -113,9 +113,9 @@ pub(crate) mod tests {
 
     #[test]
     fn flexed_hip_moves_the_knee_forward() {
-        let mut figure = standing();
-        figure.left.knee = [2.43, 0.93];
-        let placement = Segment::LeftThigh.placement(&figure);
+        let mut stick_figure = standing();
+        stick_figure.left.knee = [2.43, 0.93];
+        let placement = Segment::LeftThigh.placement(&stick_figure);
         assert!((placement.degrees + 90.0).abs() < 1e-9, "{placement:?}");
         let knee = placement.applied([0.0, 43.0]);
         assert!((knee[0] - 43.0).abs() < 1e-9 && (knee[1] + 93.0).abs() < 1e-9, "{knee:?}");

@@ -49,7 +49,7 @@ DeviceId = str
 # Identifier of a result of EMG processing.
 EmgResultId = str
 
-# What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report outcomes.
+# What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report results.
 Evaluation = Literal["optimizer", "script"]
 
 # Identifier of an entry of the feedback of a study.
@@ -81,6 +81,9 @@ LabSessionId = str
 # session accepts no more data.
 LabSessionState = Literal["planned", "under_way", "closed"]
 
+# Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
+Label = Literal["converged", "not_converged"]
+
 # A leg: `left` (intact) or `right` (prosthesis).
 Leg = Literal["left", "right"]
 
@@ -105,9 +108,6 @@ MemberKind = Literal["user", "token"]
 OrderedAnswer = Literal[
     "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both", "retracted",
 ]
-
-# Outcome of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
-Outcome = Literal["converged", "not_converged"]
 
 # Which of two gaits is better.
 PairAnswer = Literal["a", "b", "no_difference"]
@@ -149,9 +149,9 @@ SignInMethod = Literal["link", "password"]
 # by a user or a program.
 SolveStatus = Literal["converged", "infeasible", "stalled", "iteration_limit", "time_limit", "cancelled"]
 
-# Source of an entry: `convergence`, the end of a solve; `gait_rmse`, the lower Gait RMSE wins; `subject` and
-# `clinician`, a person; `script`, a lab script.
-Source = Literal["convergence", "gait_rmse", "subject", "clinician", "script"]
+# Source of an entry: `evaluation`, the optimiser or script that evaluated the trial; `gait_rmse`, the lower Gait RMSE
+# wins; `subject` and `clinician`, a person; `script`, a lab script.
+Source = Literal["evaluation", "gait_rmse", "subject", "clinician", "script"]
 
 # What a solve started from: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial guesses,
 # after the given warm start did not converge.
@@ -374,6 +374,8 @@ AuditDetail = TypedDict(
         "kept": "list[TrialId]",
         # Kind of the member (`study.member_add`, `study.member_end`) or of the measurement file (`lab_session.upload`).
         "kind": "AuditedKind",
+        # `trial.tell`: the label of the trial.
+        "label": "Label",
         # `sign_in.failures`: time of the last attempt.
         "last_at": "Instant",
         # Identifier of the member: `study.member_add`, `study.member_end`.
@@ -441,7 +443,7 @@ AuditDetail = TypedDict(
         "signed_by": "Optional[str]",
         # Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
         "simulated_walks": "int",
-        # State, as in `StudyState` (`study.create`, `study.extend`) or `TrialState` (`trial.tell`).
+        # State, as in `StudyState`: `study.create`, `study.extend`.
         "state": "str",
         # `subject.withdraw`: studies that were stopped.
         "stopped": "list[StudyId]",
@@ -2355,10 +2357,10 @@ class PhasePortrait(TypedDict):
 class PreferenceContentLabel(TypedDict):
     """Label of a trial."""
 
-    # Category: 0 for not converged, 1 for converged.
-    category: int
     # Kind of preference.
     kind: Literal["label"]
+    # Whether the evaluation found a gait.
+    label: Label
     # Identifier of the trial.
     trial: TrialId
 
@@ -2547,6 +2549,8 @@ class _RecommendationRequired(Recommended):
     certifying: bool
     # Reasons if the certificate failed.
     failures: list[str]
+    # Tuned bounds that were active in no gait of the study so far.
+    never_active: list[str]
     # Name of the study.
     study: str
     # Identifier of the study.
@@ -3285,11 +3289,11 @@ class SurvivedPushes(TypedDict):
 
 class _TellRequestRequired(TypedDict):
     # Whether the evaluation found a gait.
-    outcome: Outcome
+    label: Label
 
 
 class TellRequest(_TellRequestRequired, total=False):
-    """The outcome of a trial, as a script reports it."""
+    """The result of a trial, as a script reports it."""
 
     # Cost of transport.
     cost_of_transport: Optional[float]
@@ -3474,10 +3478,12 @@ class UnblindedPair(_UnblindedPairRequired, total=False):
 
 
 class UnblindedRater(TypedDict):
-    """Pairs of an unblinded rater."""
+    """Unblinded rater."""
 
-    # All pairs of the rater, in order.
-    pairs: list[UnblindedPair]
+    # Name of the rater.
+    rater: str
+    # Identifier of the study.
+    study_id: StudyId
 
 
 class _UnchangedBoundRequired(TypedDict):

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Ask for a trial to evaluate
 ///
-/// Returns the same trial until its outcome is reported.
+/// Returns the same trial until its result is reported.
 #[utoipa::path(
     post,
     path = "/studies/{id}/ask",
@@ -66,17 +66,17 @@ async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusa
     Ok(before)
 }
 
-/// Tell the service the outcome of a trial
+/// Tell the service the result of a trial
 ///
-/// An outcome without a gait is also a result. If the script fails, cancel the trial instead.
+/// That there is no gait is also a result. If the script fails, cancel the trial instead.
 #[utoipa::path(
     post,
     path = "/trials/{id}/tell",
-    operation_id = "tell_outcome",
+    operation_id = "tell_result",
     tag = "scripts",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
     request_body = TellRequest,
-    responses((status = 200, description = "Trial with its outcome", body = Trial)),
+    responses((status = 200, description = "Trial with its result", body = Trial)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn tell(
@@ -85,7 +85,7 @@ pub(super) async fn tell(
     IdempotentWith(request, tell): IdempotentWith<Run, TellRequest>,
 ) -> Result<Response, Refusal> {
     for _ in 0..MOST_TRIES {
-        let checked = lab_script::check_outcome(app.store_mut(), id, &tell).await;
+        let checked = lab_script::check_result(app.store_mut(), id, &tell).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,
             Err(before) => return Ok(before),

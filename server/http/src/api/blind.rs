@@ -17,7 +17,7 @@ use gaitwright_service::studies::blind::{
     self, AnswerReceipt, HandedOut, RaterAnswer, RaterReliability, UnblindedPair,
 };
 use gaitwright_store::allocations::PairWithSides;
-use gaitwright_store::{StudyId, gaits, studies};
+use gaitwright_store::{BlindPairId, StudyId, gaits, studies};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -197,17 +197,19 @@ pub(super) struct RaterUnblinding {
     reason: String,
 }
 
-/// Pairs of an unblinded rater.
+/// Unblinded rater.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct UnblindedRater {
-    /// All pairs of the rater, in order.
-    pairs: Vec<UnblindedPair>,
+    /// Identifier of the study.
+    study_id: StudyId,
+    /// Name of the rater.
+    rater: String,
 }
 
 /// Unblind a rater
 ///
-/// Reveals which gait the rater saw on which side. The audit trail records the unblinding, and later answers of the
-/// rater do not count as blind.
+/// Reveals which gait the rater saw on which side: `GET /studies/{id}/unblinded-pairs` lists it from now on. The audit
+/// trail records the unblinding, and later answers of the rater do not count as blind.
 #[utoipa::path(
     post,
     path = "/studies/{id}/raters/unblind",
@@ -215,7 +217,7 @@ pub(super) struct UnblindedRater {
     tag = "blind",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body = RaterUnblinding,
-    responses((status = 200, description = "Pairs of the rater, in order", body = UnblindedRater)),
+    responses((status = 200, description = "Unblinded rater", body = UnblindedRater)),
     security(("token" = ["administer"]), ("session" = ["administer"])),
 )]
 pub(super) async fn unblind(
@@ -227,6 +229,37 @@ pub(super) async fn unblind(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let pairs = blind::unblind(&mut writer, &request.caller, id, &whose.rater, &whose.reason).await?;
-    request.done(&app, writer, &UnblindedRater { pairs }).await
+    blind::unblind(&mut writer, &request.caller, id, &whose.rater, &whose.reason).await?;
+    request.done(&app, writer, &UnblindedRater { study_id: id, rater: whose.rater }).await
+}
+
+/// Whose pairs a list has.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PairFilter {
+    rater: Option<String>,
+}
+
+/// List the pairs of unblinded raters
+///
+/// Which gait an unblinded rater saw on which side, and the answer. Oldest first.
+#[utoipa::path(
+    get,
+    path = "/studies/{id}/unblinded-pairs",
+    operation_id = "list_unblinded_pairs",
+    tag = "blind",
+    params(("id" = StudyId, Path, description = "Identifier of the study"), ("rater" = Option<String>, Query, description = "Only the pairs of this rater. Default: those of all unblinded raters")),
+    responses((status = 200, description = "A page, oldest first", body = Page<UnblindedPair>), (status = 409, description = "The subject withdrew consent")),
+    security(("token" = ["administer"]), ("session" = ["administer"])),
+)]
+pub(super) async fn unblinded_pairs(
+    _: Authorized<Administer>,
+    State(app): State<AppState>,
+    Visible(id, _): Visible<StudyId, Administer>,
+    paging: Paging<BlindPairId, PairFilter>,
+) -> Result<Json<Page<UnblindedPair>>, Refusal> {
+    let mut reader = app.read().await?;
+    let rater = paging.filter.rater.as_deref();
+    let pairs = blind::unblinded_pairs(&mut reader, id, rater, paging.after, paging.to_read()).await?;
+    Ok(Json(paging.page(pairs, |pair| pair.id)?))
 }

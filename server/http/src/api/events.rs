@@ -5,10 +5,10 @@
 //! extended.
 
 use crate::AppState;
-use crate::event_stream::{ListenerGone, Sender, StudyListener};
 use crate::extractors::Params;
 use crate::problem_details::Refusal;
 use crate::resources;
+use crate::study_listener::{ListenerGone, Sender, StudyListener};
 use axum::extract::State;
 use axum::http::HeaderMap;
 use axum::response::Response;

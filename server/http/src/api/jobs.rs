@@ -13,7 +13,7 @@ use axum::response::Response;
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::job::{JobId, JobKind, JobState};
 use gaitwright_service::studies::job_status::{self, JobStatus};
-use gaitwright_store::{BorrowedWriter, StudyId, TrialId, jobs};
+use gaitwright_store::{BorrowedWriter, StudyId, TrialId, solve_jobs};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -196,7 +196,7 @@ pub(super) async fn workers(
     paging: Paging<String>,
 ) -> Result<Json<Page<Worker>>, Refusal> {
     // Names of workers reveal nothing about studies.
-    let running = jobs::by_worker(&mut *app.read().await?).await?;
+    let running = solve_jobs::by_worker(&mut *app.read().await?).await?;
     let all = running.into_iter().map(|(name, running_solves)| Worker { name, running_solves }).collect();
     Ok(Json(paging.cut(all, |worker| worker.name.clone())?))
 }

@@ -115,6 +115,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(blind::answer))
         .routes(routes!(blind::raters))
         .routes(routes!(blind::unblind))
+        .routes(routes!(blind::unblinded_pairs))
         // in the lab
         .routes(routes!(lab_sessions::of_study, lab_sessions::create))
         .routes(routes!(lab_sessions::get))

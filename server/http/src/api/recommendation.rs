@@ -15,6 +15,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certified_best::{self, CertificateState};
+use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan_schemas;
@@ -42,6 +43,8 @@ pub(super) struct Recommendation {
     failures: Vec<String>,
     /// If the certificate failed, the best action whose gait passed. Null if there is none.
     passing: Option<Recommended>,
+    /// Tuned bounds that were active in no gait of the study so far.
+    never_active: Vec<String>,
     /// The newest execution report of its gait. Null if nobody requested one.
     execution_report: Option<ExecutionReport>,
     /// Whether gaits of the study are being certified. If so, the recommendation may change.
@@ -177,6 +180,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
         best: Recommended::of(&gait, trial),
         certificate: certification.certificate,
         failures: certification.failures,
+        never_active: never_active(&snapshot),
         execution_report: execution_report.map(Into::into),
         certifying,
         passing: certification.passing.and_then(|id| {

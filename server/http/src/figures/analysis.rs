@@ -7,11 +7,10 @@ use gait_learner::{Dimension, LearnerError, Marginal, SearchSpace};
 use gaitwright_charts::{Chart, Figure, HeatMap, Stroke, Tile};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::analysis::{Analysis, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analysis, too_large_to_wait};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{StudyId, TrialId, studies, trials};
+use gaitwright_store::{StudyId, TrialId, feedback, studies, trials};
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -69,8 +68,9 @@ pub(crate) async fn analysis_of(app: &mut AppState, id: StudyId) -> Result<Analy
     };
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
-    if trials::counts(&mut reader, id).await?.total as usize >= MANY {
-        return too_many(format!("{MANY} trials or more"));
+    let trials = trials::counts(&mut reader, id).await?.total as usize;
+    if let Some(many) = too_large_to_wait(trials, feedback::count(&mut reader, id).await? as usize) {
+        return too_many(many);
     }
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
     drop(reader);
@@ -78,9 +78,6 @@ pub(crate) async fn analysis_of(app: &mut AppState, id: StudyId) -> Result<Analy
     if answers == 0 {
         let why = "No results yet. The analysis appears after the first result.";
         return Ok(AnalysisState::Absent(why.to_owned()));
-    }
-    if answers > MOST_ANSWERS {
-        return too_many(format!("more than {MOST_ANSWERS} answers"));
     }
     let analyses = app.analyses.clone();
     let think = move |pool: &OnPool| {

@@ -5,9 +5,8 @@ use super::utility::utility;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::analysis::{Analyses, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analyses, too_large_to_wait};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, devices, feedback, reference_gaits, studies, subjects, trials};
 
@@ -28,8 +27,8 @@ pub(crate) struct StudyResults {
     /// Name of the reference gait.
     pub(crate) reference_gait: String,
     pub(crate) counts: TrialCounts,
-    /// Number of entries of the feedback log.
-    feedback: usize,
+    /// Whether no request waits for its posterior. Then the snapshot has the newest trials only.
+    is_large: bool,
 }
 
 impl StudyResults {
@@ -40,22 +39,23 @@ impl StudyResults {
         let device = devices::get(db, study.plan.device_id).await?.name;
         let reference_gait = reference_gaits::get(db, study.plan.reference_gait_id).await?.name;
         let counts = trials::counts(db, id).await?;
-        let snapshot = if counts.total as usize >= MANY {
+        let answers = feedback::count(db, id).await? as usize;
+        let is_large = too_large_to_wait(counts.total as usize, answers).is_some();
+        let snapshot = if is_large {
             StudySnapshot::newest(db, study, NEWEST).await?
         } else {
             StudySnapshot::read(db, study).await?
         };
-        let feedback = feedback::count(db, id).await? as usize;
-        Ok(Self { snapshot, subject, device, reference_gait, counts, feedback })
+        Ok(Self { snapshot, subject, device, reference_gait, counts, is_large })
     }
 
     pub(crate) fn outcome(&self, pool: &OnPool, analyses: &Analyses) -> Result<StudyOutcome, Error> {
-        StudyOutcome::of(pool, &self.snapshot, self.counts.total as usize >= MANY, analyses).map_err(Error::Learner)
+        StudyOutcome::of(pool, &self.snapshot, self.is_large, analyses).map_err(Error::Learner)
     }
 
     /// The utility of the recommended gait over the answers of people; `None` of a large study.
     pub(crate) fn utility(&self, pool: &OnPool, analyses: &Analyses) -> Result<Option<Figure>, Error> {
-        if self.counts.total as usize >= MANY || self.feedback > MOST_ANSWERS {
+        if self.is_large {
             return Ok(None);
         }
         utility(pool, &self.snapshot, analyses).map_err(Error::Learner)

@@ -14,7 +14,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Rate, Read, RequiredRight};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{self, LabSessionProgress, NewAnswer, RecordedWalk};
-use gaitwright_store::{Instant, LabSessionId, commit, lab_sessions, members, now};
+use gaitwright_store::{Instant, LabSessionId, accessible_studies, commit, lab_sessions, now};
 use serde::Deserialize;
 
 /// How many of the newest open sessions are listed.
@@ -79,7 +79,7 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
         };
         sessions.push((session.id, session.created_at, next));
     }
-    let assigned = members::reaches_any(&mut reader, authorized.caller.reach()).await?;
+    let assigned = accessible_studies::reaches_any(&mut reader, authorized.caller.reach()).await?;
     let staff = authorized.caller.may(Read::NEEDED);
     page(&LabPage { sessions, assigned, staff })
 }

@@ -20,7 +20,7 @@ use gaitwright_service::studies::blind::{self, RaterAnswer};
 use gaitwright_store::allocations::PairWithSides;
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
 use gaitwright_store::studies::{AnswerSource, StudyFilter};
-use gaitwright_store::{Connection, Instant, Packed, StudyId, commit, consents, gaits, members, studies};
+use gaitwright_store::{Connection, Instant, Packed, StudyId, accessible_studies, commit, consents, gaits, studies};
 use serde::Deserialize;
 
 /// In how many of the newest studies a rater's newest answer is searched.
@@ -167,7 +167,7 @@ pub(super) async fn list(
     let undo = undo.filter(|_| answered.is_some_and(|saved| saved.can_be_retracted));
     let next = next.filter(|next| studies.iter().any(|(study, _)| study == next));
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
-    let assigned = members::reaches_any(&mut reader, reach).await?;
+    let assigned = accessible_studies::reaches_any(&mut reader, reach).await?;
     let not_blind = blind::is_never_blind(&mut reader, &authorized.caller).await?;
     page(&RatePage {
         studies,

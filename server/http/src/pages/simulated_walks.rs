@@ -11,7 +11,7 @@ use axum::response::Redirect;
 use gait_optimizer::execution::{ExecutionReport, SimulatedWalksOnGround};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::execution::{MOST_WALKS, NewExecutionReport, Simulation};
+use gaitwright_service::studies::execution::{MOST_SIMULATED_WALKS, NewExecutionReport, Simulation};
 use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
 use gaitwright_store::execution_reports::{ExecutionReported, StoredReport};
@@ -58,7 +58,7 @@ impl SimulatedWalks {
     }
 
     pub(super) fn most_walks() -> u32 {
-        MOST_WALKS
+        MOST_SIMULATED_WALKS
     }
 
     pub(super) fn largest_seed() -> u64 {
@@ -79,7 +79,7 @@ impl ShownReport {
         let values = vec![
             ("Strides without any disturbance", of_strides(report.undisturbed_strides)),
             ("Strides on harder and softer ground, otherwise undisturbed", by_yield.join(", ")),
-            ("Largest push at the hip survived without other disturbances", pushes(&report)),
+            ("Largest push at the hip that the walker survives without other disturbances", pushes(&report)),
             (
                 "Disturbed simulated walks",
                 format!("{simulated_walks} on each ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"),
@@ -135,7 +135,11 @@ impl WalksFields {
         let seed = self.seed.trim().parse();
         Ok(NewExecutionReport {
             simulated_walks: walks.map_err(|_| {
-                Error::invalid("simulated_walks", self.simulated_walks.as_str(), &format!("1 to {MOST_WALKS}"))
+                Error::invalid(
+                    "simulated_walks",
+                    self.simulated_walks.as_str(),
+                    &format!("1 to {MOST_SIMULATED_WALKS}"),
+                )
             })?,
             seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {LARGEST_SEED}")))?,
         })

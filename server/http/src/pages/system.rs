@@ -16,7 +16,7 @@ use gaitwright_service::studies::lifecycle;
 use gaitwright_store::backup::in_record_folder;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::totals::{self, Totals};
-use gaitwright_store::{SCHEMA_VERSION, commit, jobs, trials};
+use gaitwright_store::{SCHEMA_VERSION, commit, solve_jobs, trials};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -138,7 +138,7 @@ pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): 
 async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> PageResult {
     let mut reader = app.read().await?;
     let totals = totals::read(&mut reader).await?;
-    let (queued, running) = jobs::depth(&mut reader).await?;
+    let (queued, running) = solve_jobs::depth(&mut reader).await?;
     let may_administer = caller.may(Administer::NEEDED);
     let record = app.store().path();
     let copies = if may_administer { in_record_folder(record) } else { Ok(Vec::new()) };
@@ -151,7 +151,7 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
         schema_version: SCHEMA_VERSION,
         copies: copies.map_err(|e| Error::Internal(format!("cannot list the backups: {e}")))?,
         parallel_solves: app.scheduler.workers(),
-        running_by_worker: jobs::by_worker(&mut reader).await?,
+        running_by_worker: solve_jobs::by_worker(&mut reader).await?,
         backup,
         queued,
         running,

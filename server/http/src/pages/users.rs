@@ -28,7 +28,7 @@ use std::str::FromStr;
 /// The scopes of tokens. There is none for administration: only users administer.
 const SCOPES: [(Right, &str); 5] = [
     (Right::Read, "see studies, trials and gaits"),
-    (Right::Run, "create, start and stop studies; ask for trials and report their outcomes"),
+    (Right::Run, "create, start and stop studies; ask for trials and report their results"),
     (Right::Answer, "answer comparisons and review safety reports"),
     (Right::Rate, "compare gaits blind, and record walks and answers of lab sessions"),
     (

@@ -2,6 +2,7 @@
 
 use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Source};
+use gaitwright_store::trials::Label;
 use gaitwright_store::{FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -72,8 +73,8 @@ pub(crate) enum PreferenceContent {
     Label {
         /// Identifier of the trial.
         trial: TrialId,
-        /// Category: 0 for not converged, 1 for converged.
-        category: u32,
+        /// Whether the evaluation found a gait.
+        label: Label,
     },
     /// One trial is better than another.
     Preference {
@@ -102,7 +103,7 @@ pub(crate) enum PreferenceContent {
 impl From<feedback::FeedbackContent> for PreferenceContent {
     fn from(content: feedback::FeedbackContent) -> Self {
         match content {
-            feedback::FeedbackContent::Label { trial, category } => Self::Label { trial, category },
+            feedback::FeedbackContent::Label { trial, label } => Self::Label { trial, label },
             feedback::FeedbackContent::Preference { winner, loser } => Self::Preference { winner, loser },
             feedback::FeedbackContent::NoDifference { a, b } => Self::NoDifference { a, b },
             feedback::FeedbackContent::Suggestion { suggested, over } => Self::Suggestion { suggested, over },

@@ -1,6 +1,6 @@
 //! Solves that have not ended.
 
-use gaitwright_store::{Instant, jobs};
+use gaitwright_store::{Instant, solve_jobs};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -21,10 +21,18 @@ pub(crate) struct OpenSolve {
     created_at: Instant,
 }
 
-impl From<jobs::OpenSolve> for OpenSolve {
-    fn from(row: jobs::OpenSolve) -> Self {
-        let jobs::OpenSolve { attempts, failures, losses, worker, lease_until, created_at, trial_id: _, study_id: _ } =
-            row;
+impl From<solve_jobs::OpenSolve> for OpenSolve {
+    fn from(row: solve_jobs::OpenSolve) -> Self {
+        let solve_jobs::OpenSolve {
+            attempts,
+            failures,
+            losses,
+            worker,
+            lease_until,
+            created_at,
+            trial_id: _,
+            study_id: _,
+        } = row;
         Self { attempts, failures, losses, worker, lease_until, created_at }
     }
 }

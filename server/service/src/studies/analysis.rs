@@ -12,8 +12,20 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Above this number of answers a page cannot wait for the posterior: its computing time grows with the third power.
+/// From this number of trials on, requests do not wait for the posterior.
+pub const MANY: usize = 400;
+/// Above this number of entries of the feedback log, requests do not wait for the posterior.
 pub const MOST_ANSWERS: usize = 1500;
+
+/// Why no request waits for the posterior of a study with so many trials and entries of the feedback log: its computing
+/// time grows with their third power. `None` if requests wait.
+pub fn too_large_to_wait(trials: usize, answers: usize) -> Option<String> {
+    if trials >= MANY {
+        return Some(format!("{MANY} trials or more"));
+    }
+    (answers > MOST_ANSWERS).then(|| format!("more than {MOST_ANSWERS} answers"))
+}
+
 /// Number of studies whose results are cached.
 const KEPT: usize = 16;
 /// Number of studies whose learner is cached, so that a proposal and the pages share one fit.

@@ -43,7 +43,7 @@ pub async fn begin(reader: &mut Connection, trial: TrialId) -> Result<Certificat
     }
     if found.script.is_some() {
         return Err(Error::conflict(format!(
-            "Trial {} was evaluated by a script, which gives no gait to certify.",
+            "A script evaluated trial {}, so its gait is not stored here and cannot be certified.",
             found.number
         )));
     }

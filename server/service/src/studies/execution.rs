@@ -15,7 +15,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Largest number of simulated walks on a ground: some minutes of processor time.
-pub const MOST_WALKS: u32 = 1000;
+pub const MOST_SIMULATED_WALKS: u32 = 1000;
 
 /// A request to simulate walks. There are three kinds of ground: level, and uneven by ±5 mm or ±10 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -31,7 +31,7 @@ pub struct NewExecutionReport {
 
 impl Default for NewExecutionReport {
     fn default() -> Self {
-        let ExecutionOptions { walks: simulated_walks, seed, .. } = ExecutionOptions::default();
+        let ExecutionOptions { simulated_walks, seed, .. } = ExecutionOptions::default();
         Self { simulated_walks, seed }
     }
 }
@@ -43,13 +43,13 @@ impl NewExecutionReport {
     /// [`Error::Invalid`] naming the field.
     pub fn options(self) -> Result<ExecutionOptions, Error> {
         let Self { simulated_walks, seed } = self;
-        if !(1..=MOST_WALKS).contains(&simulated_walks) {
-            return Err(Error::invalid("simulated_walks", simulated_walks, &format!("1 to {MOST_WALKS}")));
+        if !(1..=MOST_SIMULATED_WALKS).contains(&simulated_walks) {
+            return Err(Error::invalid("simulated_walks", simulated_walks, &format!("1 to {MOST_SIMULATED_WALKS}")));
         }
         if seed > LARGEST_SEED {
             return Err(Error::invalid("seed", seed, &format!("0 to {LARGEST_SEED}")));
         }
-        Ok(ExecutionOptions { walks: simulated_walks, seed, ..ExecutionOptions::default() })
+        Ok(ExecutionOptions { simulated_walks, seed, ..ExecutionOptions::default() })
     }
 }
 

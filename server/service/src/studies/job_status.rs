@@ -12,10 +12,10 @@ use crate::backups::{self, Backups};
 use crate::error::Error;
 use crate::job::{JobId, JobState};
 use gaitwright_store::audit;
-use gaitwright_store::jobs::{self, OpenSolve};
+use gaitwright_store::solve_jobs::{self, OpenSolve};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
-    Connection, StudyId, TrialId, Writer, cancelled_jobs, certificates, explanations, members, trials,
+    Connection, StudyId, TrialId, Writer, accessible_studies, cancelled_jobs, certificates, explanations, trials,
 };
 use serde_json::json;
 
@@ -64,7 +64,7 @@ pub async fn find(db: &mut Connection, runners: Runners<'_>, id: JobId) -> Resul
         (JobId::Solve(_) | JobId::Explanation(_), None) => None,
     };
     let (state, reason) = found.ok_or_else(missing)?;
-    let solve = if let JobId::Solve(trial) = id { jobs::open_of(db, trial).await? } else { None };
+    let solve = if let JobId::Solve(trial) = id { solve_jobs::open_of(db, trial).await? } else { None };
     let progress = progress(runners.scheduler, id);
     Ok(JobStatus { id, study: trial.map(|trial| trial.study_id), state, reason, progress, solve })
 }
@@ -143,7 +143,7 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
         .collect();
     for (id, trial, state) in runners.scheduler.jobs_after_solves() {
         let study = trials::get(db, trial).await?.study_id;
-        if members::reaches(db, reach, study).await? {
+        if accessible_studies::reaches(db, reach, study).await? {
             all.push(status(id, Some(study), state, None));
         }
     }
@@ -158,7 +158,7 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
             all.push(status(id, Some(study), JobState::Queued, None));
         }
     }
-    for solve in jobs::open(db, reach).await? {
+    for solve in solve_jobs::open(db, reach).await? {
         let state = if solve.worker.is_some() { JobState::Running } else { JobState::Queued };
         all.push(status(JobId::Solve(solve.trial_id), Some(solve.study_id), state, Some(solve)));
     }

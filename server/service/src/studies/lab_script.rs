@@ -17,9 +17,9 @@ use gaitwright_compute::OnPool;
 use gaitwright_store::audit;
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyState};
-use gaitwright_store::trials::{NewTrial, ScriptOutcome, Trial, TrialState};
+use gaitwright_store::trials::{Label, NewTrial, ReportedResult, Trial, TrialState};
 use gaitwright_store::{Connection, Store, StudyId, TrialId, Writer, events, studies, trials};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::json;
 use std::sync::Arc;
 use utoipa::ToSchema;
@@ -148,23 +148,12 @@ pub async fn assign(
     Ok(Some(trials::get(writer, id).await?))
 }
 
-/// Outcome of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result,
-/// too.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Outcome {
-    /// The evaluation found a gait.
-    Converged,
-    /// The evaluation found no gait, which is a result too.
-    NotConverged,
-}
-
-/// The outcome of a trial, as a script reports it.
+/// The result of a trial, as a script reports it.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TellRequest {
     /// Whether the evaluation found a gait.
-    pub outcome: Outcome,
+    pub label: Label,
     /// Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -178,19 +167,19 @@ pub struct TellRequest {
     pub cost_of_transport: Option<f64>,
 }
 
-/// A checked outcome, ready to be written.
+/// A checked result, ready to be written.
 #[derive(Debug)]
-pub struct CheckedOutcome {
+pub struct CheckedResult {
     snapshot: StudySnapshot,
-    outcome: ScriptOutcome,
+    result: ReportedResult,
     answers: Vec<FeedbackContent>,
 }
 
-/// Checks an outcome and derives its preferences, outside any transaction.
+/// Checks a result and derives its preferences, outside any transaction.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the trial is not open or not evaluated by a script.
-pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &TellRequest) -> Result<CheckedOutcome, Error> {
+pub async fn check_result(store: &mut Store, id: TrialId, tell: &TellRequest) -> Result<CheckedResult, Error> {
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
     if trial.script.is_none() {
@@ -203,14 +192,14 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &TellRequest) -
         )));
     }
     let study = studies::get(&mut db, trial.study_id).await?;
-    let outcome = checked(&study, tell)?;
+    let result = checked(&study, tell)?;
     let snapshot = StudySnapshot::read(&mut db, study).await?;
     drop(db);
-    let (TrialState::Converged, Some(rmse)) = (outcome.state, outcome.gait_rmse_rad) else {
-        return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
+    let (Label::Converged, Some(rmse)) = (result.label, result.gait_rmse_rad) else {
+        return Ok(CheckedResult { snapshot, result, answers: Vec::new() });
     };
     if snapshot.study.plan.answer_source == AnswerSource::People {
-        return Ok(CheckedOutcome { snapshot, outcome, answers: Vec::new() });
+        return Ok(CheckedResult { snapshot, result, answers: Vec::new() });
     }
     let find = move |pool: &OnPool| {
         let partners = partners(pool, &snapshot, id);
@@ -222,10 +211,10 @@ pub async fn check_outcome(store: &mut Store, id: TrialId, tell: &TellRequest) -
         .into_iter()
         .filter_map(|old| snapshot.trial(old)?.gait_rmse_rad.map(|figure| by_gait_rmse((id, rmse), (old, figure))))
         .collect();
-    Ok(CheckedOutcome { snapshot, outcome, answers })
+    Ok(CheckedResult { snapshot, result, answers })
 }
 
-fn checked(study: &Study, tell: &TellRequest) -> Result<ScriptOutcome, Error> {
+fn checked(study: &Study, tell: &TellRequest) -> Result<ReportedResult, Error> {
     let reason = tell.reason.trim();
     printable::note("reason", reason, 2000)?;
     for (field, value) in [("gait_rmse_rad", tell.gait_rmse_rad), ("cost_of_transport", tell.cost_of_transport)] {
@@ -233,27 +222,24 @@ fn checked(study: &Study, tell: &TellRequest) -> Result<ScriptOutcome, Error> {
             return Err(Error::invalid(field, json!(value), "0 to 1e6"));
         }
     }
-    let state = match tell.outcome {
-        Outcome::Converged => TrialState::Converged,
-        Outcome::NotConverged if reason.is_empty() => {
-            return Err(Error::invalid("reason", "", "1 to 2000 characters, the reason why no gait was found"));
-        }
-        Outcome::NotConverged => TrialState::NotConverged,
-    };
+    if tell.label == Label::NotConverged && reason.is_empty() {
+        return Err(Error::invalid("reason", "", "1 to 2000 characters long and say why no gait was found"));
+    }
+    let converged = tell.label == Label::Converged;
     let answered_by_rmse = study.plan.answer_source != AnswerSource::People;
-    if state == TrialState::Converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
+    if converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
         let allowed = "a number, because Gait RMSE answers the comparisons of this study";
         return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));
     }
-    Ok(ScriptOutcome {
-        state,
-        gait_rmse_rad: tell.gait_rmse_rad.filter(|_| state == TrialState::Converged),
-        cost_of_transport: tell.cost_of_transport.filter(|_| state == TrialState::Converged),
+    Ok(ReportedResult {
+        label: tell.label,
+        gait_rmse_rad: tell.gait_rmse_rad.filter(|_| converged),
+        cost_of_transport: tell.cost_of_transport.filter(|_| converged),
         message: reason.to_owned(),
     })
 }
 
-/// Writes an outcome. Returns `None` if the study has changed, and the caller must check again.
+/// Writes a result. Returns `None` if the study has changed, and the caller must check again.
 ///
 /// # Errors
 /// Errors of the database.
@@ -261,19 +247,19 @@ pub async fn record(
     writer: &mut Writer,
     caller: &Caller,
     id: TrialId,
-    checked: &CheckedOutcome,
+    checked: &CheckedResult,
 ) -> Result<Option<Trial>, Error> {
     let study = checked.snapshot.study.id;
     let present = trials::get(writer, id).await?;
     if present.state != TrialState::Running || !checked.snapshot.is_unchanged(writer).await? {
         return Ok(None);
     }
-    trials::tell(writer, id, &checked.outcome).await?;
-    preference::compute(writer, study, (id, checked.outcome.state), &checked.answers, &caller.name).await?;
-    let payload = json!({ "trial_id": id, "number": present.number, "state": checked.outcome.state });
+    trials::tell(writer, id, &checked.result).await?;
+    preference::compute(writer, study, (id, checked.result.label), &checked.answers, &caller.name).await?;
+    let payload = json!({ "trial_id": id, "number": present.number, "state": TrialState::from(checked.result.label) });
     events::append(writer, study, "trial_ended", &payload).await?;
     let detail =
-        json!({ "study": study, "state": checked.outcome.state, "gait_rmse_rad": checked.outcome.gait_rmse_rad });
+        json!({ "study": study, "label": checked.result.label, "gait_rmse_rad": checked.result.gait_rmse_rad });
     audit::append(writer, &caller.actor, "trial.tell", &format!("trial {id}"), &detail).await?;
     Ok(Some(trials::get(writer, id).await?))
 }

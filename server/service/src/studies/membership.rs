@@ -6,7 +6,7 @@ use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::members::{self, MEMBER_ALREADY, Member, MemberKind};
 use gaitwright_store::users::User;
-use gaitwright_store::{Connection, MemberId, OnConstraint, StudyId, Writer, tokens, users};
+use gaitwright_store::{Connection, MemberId, OnConstraint, StudyId, Writer, accessible_studies, tokens, users};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -104,7 +104,7 @@ pub async fn restrict(writer: &mut Writer, caller: &Caller, study: StudyId, rest
 /// Makes the caller a member if the study would otherwise become inaccessible to the caller.
 pub(super) async fn ensure_caller_is_member(writer: &mut Writer, caller: &Caller, study: StudyId) -> Result<(), Error> {
     if let Reach::Open(who) | Reach::Assigned(who) = caller.reach()
-        && !members::reaches(writer, caller.reach(), study).await?
+        && !accessible_studies::reaches(writer, caller.reach(), study).await?
     {
         insert(writer, &caller.actor, study, who).await?;
     }

@@ -23,6 +23,7 @@ pub mod execution;
 pub mod execution_request;
 mod explainer;
 pub mod explanation;
+mod fold;
 pub mod gait_utilities;
 pub mod history;
 pub mod job_status;

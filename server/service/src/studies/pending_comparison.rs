@@ -93,7 +93,7 @@ pub fn pending_comparison(_: &OnPool, snapshot: &StudySnapshot) -> Result<Pendin
     });
     let proposed =
         proposed_comparisons_among(&plan.search_space, &before, newest, &plan.learner, |a| candidates.contains(&a))?;
-    let open = proposed.into_iter().filter(|c| !is_answered(&log, c.action, c.against));
+    let open = proposed.into_iter().filter(|c| !is_answered(snapshot, &log, c.action, c.against));
     let mut pairs = open.filter_map(|c| Some((snapshot.trial_of(c.action)?, snapshot.trial_of(c.against)?)));
     let Some((first, second)) = pairs.find(|(a, b)| !snapshot.grounds.safety_reports.is_skipped((a.id, b.id))) else {
         return Ok(PendingComparison::None);
@@ -109,9 +109,16 @@ pub fn pending_comparison(_: &OnPool, snapshot: &StudySnapshot) -> Result<Pendin
     })
 }
 
-fn is_answered(log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {
+/// Whether someone has compared these gaits, whichever actions they had then.
+fn is_answered(snapshot: &StudySnapshot, log: &FeedbackLog, a: ActionIndex, b: ActionIndex) -> bool {
+    let is_same = |one: ActionIndex, other: ActionIndex| {
+        let trials = || Some((snapshot.trial_of(one)?, snapshot.trial_of(other)?));
+        one == other || trials().is_some_and(|(one, other)| is_same_gait(one, other))
+    };
     log.feedback.iter().any(|feedback| {
         let (first, second) = feedback.actions();
-        second.is_some_and(|second| (first, second) == (a, b) || (second, first) == (a, b))
+        second.is_some_and(|second| {
+            (is_same(first, a) && is_same(second, b)) || (is_same(first, b) && is_same(second, a))
+        })
     })
 }

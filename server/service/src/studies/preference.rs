@@ -9,7 +9,7 @@ use crate::printable;
 use gait_learner::ActionIndex;
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
 use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::{Label, Trial, TrialState};
 use gaitwright_store::{BlindPairId, Connection, FeedbackId, StudyId, TrialId, Writer, assessments, authors, trials};
 use serde_json::Value;
 
@@ -231,13 +231,13 @@ pub(super) async fn suggest(
 pub(super) async fn compute(
     writer: &mut Writer,
     study: StudyId,
-    (trial, state): (TrialId, TrialState),
+    (trial, label): (TrialId, Label),
     answers: &[FeedbackContent],
     author: &str,
 ) -> Result<(), Error> {
     let attribution = |source| Attribution { source, author, note: "" };
-    let label = FeedbackContent::Label { trial, category: u32::from(state == TrialState::Converged) };
-    feedback::append(writer, study, &label, attribution(Source::Convergence)).await?;
+    let label = FeedbackContent::Label { trial, label };
+    feedback::append(writer, study, &label, attribution(Source::Evaluation)).await?;
     for answer in answers {
         feedback::append(writer, study, answer, attribution(Source::GaitRmse)).await?;
     }

@@ -17,7 +17,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::{Evaluation, Study, StudyState};
 use gaitwright_store::trials::{NewTrial, Trial, TrialState};
-use gaitwright_store::{Connection, Store, TrialId, Writer, events, explanations, jobs, studies, trials};
+use gaitwright_store::{Connection, Store, TrialId, Writer, events, explanations, solve_jobs, studies, trials};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -228,7 +228,7 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
         events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": "trial.relax" })).await?;
     }
     let Some(trial) = snapshot.write_trial(writer, new).await? else { return Ok(None) };
-    jobs::insert(writer, trial).await?;
+    solve_jobs::insert(writer, trial).await?;
     let payload = json!({ "trial_id": trial, "number": new.number, "state": TrialState::Queued });
     events::append(writer, study.id, "trial_queued", &payload).await?;
     let detail = json!({

@@ -70,7 +70,7 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
     let intervals = mesh.ds2 + mesh.ds3 + mesh.ss2 + mesh.ss1;
     if intervals > MOST_INTERVALS {
         return Err(Error::conflict(format!(
-            "The mesh of trial {number} has {intervals} intervals. The service computes sensitivities up to {MOST_INTERVALS}; \
+            "The mesh of trial {number} has {intervals} intervals. The service computes sensitivities for at most {MOST_INTERVALS} intervals; \
              for a finer mesh, download the problem file of the trial and run `gaitwright solve --problem problem.json --sensitivities`."
         )));
     }

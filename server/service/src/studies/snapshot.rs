@@ -7,7 +7,7 @@ use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
 use gaitwright_store::studies::{AnswerSource, Evaluation, Study};
-use gaitwright_store::trials::{NewTrial, Trial, TrialState};
+use gaitwright_store::trials::{Label, NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studies, trials};
 use std::collections::{HashMap, HashSet};
 
@@ -210,14 +210,15 @@ impl StudySnapshot {
 
 /// Whether a person or a script answered, and the answer was not retracted.
 pub(super) fn is_answer_of_a_person(row: &FeedbackRow) -> bool {
-    row.retraction.is_none() && !matches!(row.source, Source::Convergence | Source::GaitRmse)
+    row.retraction.is_none() && !matches!(row.source, Source::Evaluation | Source::GaitRmse)
 }
 
 /// Converts an answer about trials to one about actions. `None` if both trials have the same action.
 fn in_terms_of_actions(content: &FeedbackContent, action: impl Fn(TrialId) -> Option<ActionIndex>) -> Option<Feedback> {
     let feedback = match *content {
-        FeedbackContent::Label { trial, category } => {
-            Feedback::Label { action: action(trial)?, category: usize::try_from(category).ok()? }
+        FeedbackContent::Label { trial, label } => {
+            // The default threshold of the learner separates two categories.
+            Feedback::Label { action: action(trial)?, category: usize::from(label == Label::Converged) }
         }
         FeedbackContent::Preference { winner, loser } => {
             Feedback::Preference { winner: action(winner)?, loser: action(loser)? }

@@ -1,10 +1,11 @@
 //! The summary of a study as one document, as `tune --json` prints it for scripts.
 
 use super::certified_best::{BestCertification, CertificateState};
+use super::equal_actions::never_active;
 use super::snapshot::StudySnapshot;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::{Label, Trial, TrialState};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Serialize;
 
@@ -29,6 +30,8 @@ pub struct Summary {
     pub best_failures: Vec<String>,
     /// If it failed, the best trial whose gait passed.
     pub passing: Option<TrialSummary>,
+    /// Tuned bounds that were active in no gait so far.
+    pub never_active: Vec<String>,
     /// Every trial, by number.
     pub trials: Vec<TrialSummary>,
 }
@@ -42,8 +45,8 @@ pub struct TrialSummary {
     pub trial_id: TrialId,
     /// Bounds of the trial.
     pub action: TunedBounds,
-    /// `converged` or `not_converged`. Absent without a result.
-    pub label: Option<TrialState>,
+    /// Label. Absent without a result.
+    pub label: Option<Label>,
     /// State of the trial.
     pub state: TrialState,
     /// Status of the solve.
@@ -73,6 +76,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, certification: BestCe
         best_certificate: certification.certificate,
         best_failures: certification.failures,
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
+        never_active: never_active(snapshot),
         trials: snapshot.trials.iter().map(|trial| line(trial, &snapshot.trials)).collect(),
     }
 }
@@ -87,7 +91,7 @@ fn line(trial: &Trial, all: &[Trial]) -> TrialSummary {
         number: trial.number,
         trial_id: trial.id,
         action: trial.action,
-        label: Some(trial.state).filter(|state| state.is_result()),
+        label: trial.state.label(),
         state: trial.state,
         status: trial.status,
         gait_rmse_rad: trial.gait_rmse_rad,

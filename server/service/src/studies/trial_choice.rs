@@ -1,6 +1,6 @@
 //! Chooses the next trial and the best trial of a study, as pure functions of its snapshot.
 
-use super::analysis::Analyses;
+use super::analysis::{Analyses, too_large_to_wait};
 use super::bound_grid;
 use super::equal_actions::equal_actions;
 use super::ranking::{by_mean, ranking};
@@ -112,10 +112,8 @@ pub fn best_trial(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Opt
     Ok(ranking(snapshot, posterior)?.first().copied())
 }
 
-/// From this number of trials on, pages show the last known best trial instead of computing the posterior.
-pub const MANY: usize = 400;
-
-/// The ranking for pages. For a large study it has only the trial that was best when the newest one was proposed.
+/// The ranking for pages. Of a study whose posterior no request waits for, it has only the trial that was best when the
+/// newest one was proposed.
 ///
 /// # Errors
 /// When the learner cannot work with the log.
@@ -124,7 +122,7 @@ pub fn ranking_to_show(
     snapshot: &StudySnapshot,
     analyses: &Analyses,
 ) -> Result<Vec<TrialId>, LearnerError> {
-    if snapshot.trials.len() >= MANY {
+    if too_large_to_wait(snapshot.trials.len(), snapshot.feedback.len()).is_some() {
         return Ok(last_known_best(snapshot).into_iter().collect());
     }
     ranking(snapshot, &*analyses.posterior(pool, snapshot)?)

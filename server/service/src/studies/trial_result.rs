@@ -1,6 +1,7 @@
 //! Records the result of a trial exactly once: state, label, gait and the preferences that Gait RMSE implies, in one
 //! transaction.
 
+use super::fold;
 use super::pending_comparison::{by_gait_rmse, partners};
 use super::preference::{self, PROGRAM};
 use super::snapshot::StudySnapshot;
@@ -9,10 +10,10 @@ use crate::error::Error;
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::gaits::PackedGait;
-use gaitwright_store::jobs::{FailureCounts, Lease};
+use gaitwright_store::solve_jobs::{FailureCounts, Lease};
 use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{TrialEnd, TrialState};
-use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, jobs, studies, trials};
+use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, solve_jobs, studies, trials};
 use serde_json::json;
 use std::time::Duration;
 
@@ -33,13 +34,14 @@ pub async fn ended(
     outcome: &SolveOutcome,
     gait: Option<&PackedGait>,
 ) -> Result<bool, Error> {
-    let Some(state) = trial_transitions::result_of(outcome.report.status) else {
+    let Some(label) = trial_transitions::label_of(outcome.report.status) else {
         return match outcome.report.status {
             SolveStatus::Cancelled => interrupted(store, lease).await,
             _ => broke(store, lease, "The solve ran out of time.").await,
         };
     };
-    let end = TrialEnd {
+    let state = TrialState::from(label);
+    let mut end = TrialEnd {
         state,
         report: Some(outcome.report.clone()),
         violations: outcome.violations.clone(),
@@ -51,13 +53,18 @@ pub async fn ended(
         let study = studies::get(&mut reader, lease.study).await?;
         let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
+        if let Some(fold) =
+            snapshot.trial(lease.trial).and_then(|trial| fold::in_words(&snapshot, trial, &outcome.report))
+        {
+            end.message = fold;
+        }
         let answers = answers(store, &snapshot, lease.trial, &end).await?;
 
         let mut writer = store.write().await?;
         if !snapshot.is_current(&mut writer).await? {
             continue;
         }
-        let used = jobs::finish(&mut writer, lease).await?;
+        let used = solve_jobs::finish(&mut writer, lease).await?;
         attempts::insert(&mut writer, (lease.trial, lease.attempt), worker, &outcome.report, used).await?;
         if !used {
             commit(writer).await?;
@@ -68,7 +75,7 @@ pub async fn ended(
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;
         }
-        preference::compute(&mut writer, lease.study, (lease.trial, state), &answers, PROGRAM).await?;
+        preference::compute(&mut writer, lease.study, (lease.trial, label), &answers, PROGRAM).await?;
         tell(&mut writer, lease, state).await?;
         commit(writer).await?;
         return Ok(true);
@@ -84,7 +91,7 @@ pub async fn ended(
 pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, Error> {
     tracing::warn!(trial = %lease.trial, attempt = lease.attempt, reason, "a solve failed");
     let mut writer = store.write().await?;
-    let before = jobs::failure_counts(&mut writer, lease.job).await?;
+    let before = solve_jobs::failure_counts(&mut writer, lease.job).await?;
     let after = FailureCounts { failures: before.failures + 1, ..before };
     let recorded = give_up_or_requeue(&mut writer, lease, TrialEvent::Broke(before), after, reason).await?;
     commit(writer).await?;
@@ -97,7 +104,7 @@ pub async fn broke(store: &Store, lease: &Lease, reason: &str) -> Result<bool, E
 /// Errors of the database.
 pub async fn record_expired_lease(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
-    let before = jobs::failure_counts(&mut writer, lease.job).await?;
+    let before = solve_jobs::failure_counts(&mut writer, lease.job).await?;
     let after = FailureCounts { losses: before.losses + 1, ..before };
     let reason = "The worker's lease expired.";
     let recorded = give_up_or_requeue(&mut writer, lease, TrialEvent::Silent(before), after, reason).await?;
@@ -111,7 +118,7 @@ pub async fn record_expired_lease(store: &Store, lease: &Lease) -> Result<bool, 
 /// Errors of the database.
 pub async fn interrupted(store: &Store, lease: &Lease) -> Result<bool, Error> {
     let mut writer = store.write().await?;
-    let same = jobs::failure_counts(&mut writer, lease.job).await?;
+    let same = solve_jobs::failure_counts(&mut writer, lease.job).await?;
     let recorded = give_up_or_requeue(&mut writer, lease, TrialEvent::Interrupted, same, "").await?;
     commit(writer).await?;
     Ok(recorded)
@@ -125,7 +132,7 @@ pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Res
     let row = trials::get(writer, trial).await?;
     let state =
         trial_transitions::after(row.state, TrialEvent::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
-    jobs::cancel(writer, trial).await?;
+    solve_jobs::cancel(writer, trial).await?;
     let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
     trials::finish(writer, trial, &end).await?;
     let payload = json!({ "trial_id": trial, "number": row.number, "state": state });
@@ -144,7 +151,7 @@ pub async fn retried(writer: &mut Writer, trial: TrialId) -> Result<(), Error> {
             "A script evaluates this trial, so it cannot be queued again. The script must ask for another trial.",
         ));
     }
-    jobs::reopen(writer, trial).await?;
+    solve_jobs::reopen(writer, trial).await?;
     trials::requeue(writer, trial, "").await?;
     let payload = json!({ "trial_id": trial, "number": row.number, "state": TrialState::Queued });
     Ok(events::append(writer, row.study_id, "trial_queued", &payload).await?)
@@ -157,12 +164,12 @@ async fn give_up_or_requeue(
     after: FailureCounts,
     reason: &str,
 ) -> Result<bool, Error> {
-    if !jobs::finish(writer, lease).await? {
+    if !solve_jobs::finish(writer, lease).await? {
         return Ok(false);
     }
     let state = trial_transitions::after(TrialState::Running, event).map_err(|e| Error::Internal(e.to_string()))?;
     if state == TrialState::Queued {
-        jobs::requeue(writer, lease.job, after).await?;
+        solve_jobs::requeue(writer, lease.job, after).await?;
         trials::requeue(writer, lease.trial, reason).await?;
     } else {
         let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };

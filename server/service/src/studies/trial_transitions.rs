@@ -1,8 +1,8 @@
 //! The state machine of a trial, as a pure function of what happens to its job.
 
 use gait_optimizer::SolveStatus;
-use gaitwright_store::jobs::FailureCounts;
-use gaitwright_store::trials::TrialState;
+use gaitwright_store::solve_jobs::FailureCounts;
+use gaitwright_store::trials::{Label, TrialState};
 use thiserror::Error;
 
 /// How often a failed or lost job is retried.
@@ -55,14 +55,14 @@ fn participle(event: TrialEvent) -> &'static str {
     }
 }
 
-/// The result for the learner of a solve status, if it is one.
+/// The label of a trial whose solve ended with this status, if that is a result.
 ///
 /// A time limit depends on the speed of the machine, not on the action, and a cancelled solve says nothing. Neither is
 /// a result.
-pub fn result_of(status: SolveStatus) -> Option<TrialState> {
+pub fn label_of(status: SolveStatus) -> Option<Label> {
     match status {
-        SolveStatus::Converged => Some(TrialState::Converged),
-        SolveStatus::Infeasible | SolveStatus::Stalled | SolveStatus::IterationLimit => Some(TrialState::NotConverged),
+        SolveStatus::Converged => Some(Label::Converged),
+        SolveStatus::Infeasible | SolveStatus::Stalled | SolveStatus::IterationLimit => Some(Label::NotConverged),
         SolveStatus::TimeLimit | SolveStatus::Cancelled => None,
     }
 }
@@ -75,7 +75,7 @@ pub fn after(state: TrialState, event: TrialEvent) -> Result<TrialState, Impossi
     use TrialState::{Cancelled, Failed, Lost, Queued, Running};
     match (state, event) {
         (Queued, TrialEvent::Leased) => Ok(Running),
-        (Running, TrialEvent::Solved(status)) => result_of(status).ok_or(Impossible { state, event }),
+        (Running, TrialEvent::Solved(status)) => label_of(status).map(Into::into).ok_or(Impossible { state, event }),
         (Running, TrialEvent::Broke(before)) => Ok(if before.failures < RETRIES { Queued } else { Failed }),
         (Running, TrialEvent::Silent(before)) => Ok(if before.losses < RETRIES { Queued } else { Lost }),
         (Running, TrialEvent::Interrupted) | (Failed | Lost | Cancelled, TrialEvent::Retried) => Ok(Queued),

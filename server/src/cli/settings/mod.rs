@@ -9,7 +9,6 @@ mod values;
 
 pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
 
-use super::output::data;
 use gaitwright_service::error::Error;
 use known_settings::KNOWN;
 use setting_origin::SettingOrigin;
@@ -75,14 +74,12 @@ impl Settings {
         Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
     }
 
-    /// Prints every setting, its value and its origin.
-    pub(super) fn show(&self) -> Result<(), Error> {
-        for &(name, _, meaning) in KNOWN {
+    /// Every setting: its name, value, origin and meaning.
+    pub(super) fn entries(&self) -> impl Iterator<Item = (&'static str, &str, String, &'static str)> {
+        KNOWN.iter().map(|&(name, _, meaning)| {
             let origin = self.0.get(name).map(|(_, origin)| origin.to_string()).unwrap_or_default();
-            let value = without_password(self.text(name));
-            data(&format!("{name} = {value:?}  # {origin}; {meaning}"))?;
-        }
-        Ok(())
+            (name, self.text(name), origin, meaning)
+        })
     }
 }
 
@@ -94,15 +91,6 @@ pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<Stri
         names.filter(|name| name.strip_prefix("GAITWRIGHT_").is_some_and(|rest| !is_known(rest))).collect();
     unknown.sort();
     unknown
-}
-
-/// The address without the user and password in it.
-fn without_password(text: &str) -> String {
-    let Some((scheme, rest)) = text.split_once("://") else { return text.to_owned() };
-    match rest.rsplit_once('@') {
-        Some((_, host)) => format!("{scheme}://...@{host}"),
-        None => text.to_owned(),
-    }
 }
 
 #[cfg(test)]
@@ -186,12 +174,5 @@ mod tests {
             let _ = parse(Path::new("x.toml"), &bytes);
             let _ = parse(Path::new("x.toml"), &format!("listen = {bytes:?}"));
         }
-    }
-
-    #[test]
-    fn passwords_in_addresses_are_hidden() {
-        assert_eq!(without_password("nats://lab:s3@cret@broker:4222"), "nats://...@broker:4222");
-        assert_eq!(without_password("nats://broker:4222"), "nats://broker:4222");
-        assert_eq!(without_password("warn,gaitwright=info"), "warn,gaitwright=info");
     }
 }

@@ -202,7 +202,7 @@ impl PairWithSides {
 /// # Errors
 /// Errors of the database.
 pub async fn own_pair(db: &mut Connection, code: &str, rater: &str) -> StoreResult<Option<PairWithSides>> {
-    let found = sided("where p.code = ? and p.rater = ?", &[code, rater], db).await?;
+    let found = sided("where p.code = ? and p.rater = ?", &[Some(code), Some(rater)], db).await?;
     Ok(found.into_iter().next())
 }
 
@@ -213,16 +213,35 @@ pub async fn own_pair(db: &mut Connection, code: &str, rater: &str) -> StoreResu
 pub async fn of_unblinded_raters(db: &mut Connection, study: StudyId) -> StoreResult<Vec<PairWithSides>> {
     let rest = "where p.study_id = ? and exists \
                 (select 1 from rater_unblindings u where u.study_id = p.study_id and u.rater = p.rater) order by p.id";
-    sided(rest, &[&study.to_string()], db).await
+    sided(rest, &[Some(&study.to_string())], db).await
+}
+
+/// A page of the pairs of unblinded raters of a study, in the order of the draws: of one rater or, without a name, of all.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn page_of_unblinded_raters(
+    db: &mut Connection,
+    study: StudyId,
+    rater: Option<&str>,
+    after: Option<BlindPairId>,
+    limit: u32,
+) -> StoreResult<Vec<PairWithSides>> {
+    let rest = "where p.study_id = ? and p.rater = coalesce(?, p.rater) and p.id > ? and exists \
+                (select 1 from rater_unblindings u where u.study_id = p.study_id and u.rater = p.rater) \
+                order by p.id limit cast(? as integer)";
+    let (study, after, limit) =
+        (study.to_string(), after.map_or_else(String::new, |id| id.to_string()), limit.to_string());
+    sided(rest, &[Some(&study), rater, Some(&after), Some(&limit)], db).await
 }
 
 /// Reads pairs with their sides. `rest` states why the sides may be known.
-async fn sided(rest: &'static str, values: &[&str], db: &mut Connection) -> StoreResult<Vec<PairWithSides>> {
+async fn sided(rest: &'static str, values: &[Option<&str>], db: &mut Connection) -> StoreResult<Vec<PairWithSides>> {
     let columns = SELECT.replacen("select p.*", "select p.*, s.swapped", 1);
     let sql = format!("{columns} join blind_pair_allocations s on s.pair_id = p.id {rest}");
     let mut query = sqlx::query(AssertSqlSafe(sql));
     for value in values {
-        query = query.bind((*value).to_owned());
+        query = query.bind(value.map(str::to_owned));
     }
     let row = |row: &SqliteRow| -> StoreResult<PairWithSides> {
         Ok(PairWithSides { pair: BlindPair::from_row(row)?, swapped: row.try_get("swapped")? })

@@ -1,18 +1,19 @@
 //! What an entry of the feedback log says, and where it comes from.
 
+use crate::trials::Label;
 use crate::{StoreError, StoreResult, TrialId};
 use gait_learner::ActionIndex;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Source of an entry: `convergence`, the end of a solve; `gait_rmse`, the lower Gait RMSE wins; `subject` and
+/// Source of an entry: `evaluation`, the optimiser or script that evaluated the trial; `gait_rmse`, the lower Gait RMSE wins; `subject` and
 /// `clinician`, a person; `script`, a lab script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
-    /// The solver.
-    Convergence,
+    /// The optimiser or script that evaluated the trial.
+    Evaluation,
     /// Gait RMSE; the smaller one wins.
     GaitRmse,
     /// The subject.
@@ -27,7 +28,7 @@ impl Source {
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Convergence => "convergence",
+            Self::Evaluation => "evaluation",
             Self::GaitRmse => "gait_rmse",
             Self::Subject => "subject",
             Self::Clinician => "clinician",
@@ -39,7 +40,7 @@ impl Source {
 impl FromStr for Source {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Convergence, Self::GaitRmse, Self::Subject, Self::Clinician, Self::Script]
+        [Self::Evaluation, Self::GaitRmse, Self::Subject, Self::Clinician, Self::Script]
             .into_iter()
             .find(|source| source.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("feedback source", text))
@@ -53,8 +54,8 @@ pub enum FeedbackContent {
     Label {
         /// Identifier of the trial.
         trial: TrialId,
-        /// Category: 0 for not converged, 1 for converged.
-        category: u32,
+        /// Whether the evaluation found a gait.
+        label: Label,
     },
     /// One trial is better than another.
     Preference {

@@ -81,8 +81,8 @@ pub async fn append(
     attribution: Attribution<'_>,
 ) -> StoreResult<FeedbackId> {
     let id = FeedbackId::fresh();
-    let (kind, a, b, category, suggested) = match *content {
-        FeedbackContent::Label { trial, category } => ("label", trial, None, Some(category), None),
+    let (kind, a, b, label, suggested) = match *content {
+        FeedbackContent::Label { trial, label } => ("label", trial, None, Some(label.as_str()), None),
         FeedbackContent::Preference { winner, loser } => ("preference", winner, Some(loser), None, None),
         FeedbackContent::NoDifference { a, b } => ("no_difference", a, Some(b), None, None),
         FeedbackContent::Suggestion { suggested, over } => {
@@ -90,7 +90,7 @@ pub async fn append(
         }
     };
     sqlx::query(
-        "insert into feedback (id, study_id, kind, trial_a, trial_b, category, suggested, source, author, note, \
+        "insert into feedback (id, study_id, kind, trial_a, trial_b, label, suggested, source, author, note, \
          created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
@@ -98,7 +98,7 @@ pub async fn append(
     .bind(kind)
     .bind(a)
     .bind(b)
-    .bind(category)
+    .bind(label)
     .bind(suggested)
     .bind(attribution.source.as_str())
     .bind(attribution.author)
@@ -315,11 +315,11 @@ pub async fn count(db: &mut Connection, study: StudyId) -> StoreResult<u32> {
 fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
     let a: TrialId = row.try_get("trial_a")?;
     let b: Option<TrialId> = row.try_get("trial_b")?;
-    let category: Option<u32> = row.try_get("category")?;
+    let label: Option<&str> = row.try_get("label")?;
     let suggested: Option<i64> = row.try_get("suggested")?;
     let kind: &str = row.try_get("kind")?;
-    let content = match (kind, b, category, suggested) {
-        ("label", None, Some(category), None) => FeedbackContent::Label { trial: a, category },
+    let content = match (kind, b, label, suggested) {
+        ("label", None, Some(label), None) => FeedbackContent::Label { trial: a, label: label.parse()? },
         ("preference", Some(loser), None, None) => FeedbackContent::Preference { winner: a, loser },
         ("no_difference", Some(b), None, None) => FeedbackContent::NoDifference { a, b },
         ("suggestion", None, None, Some(index)) => {

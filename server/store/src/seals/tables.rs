@@ -67,7 +67,7 @@ pub const TABLES: &[Sealed] = &[
 /// Tables with checksums: their rows change often, or only repeat other data.
 pub const CHECKED: &[Sealed] = &[
     sealed("events", &["seq"]),
-    sealed("jobs", &["id"]),
+    sealed("solve_jobs", &["id"]),
     Sealed { table: "idempotency_keys", key: &["actor", "key"], hex: true },
     sealed("sessions", &["hash"]),
     sealed("sign_in_links", &["hash"]),

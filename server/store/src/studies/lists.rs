@@ -2,7 +2,7 @@
 
 use super::{Study, StudyState, from_row};
 use crate::accessible_studies::Reach;
-use crate::members::{reach_values, reached};
+use crate::accessible_studies::{reach_values, reached};
 use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
 
 /// Which studies of those that a caller reaches.

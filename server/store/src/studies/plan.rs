@@ -41,13 +41,13 @@ impl FromStr for AnswerSource {
     }
 }
 
-/// What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report outcomes.
+/// What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Evaluation {
     /// The service, by optimisation.
     Optimizer,
-    /// Lab scripts, which ask for trials and report their outcomes.
+    /// Lab scripts, which ask for trials and report their results.
     Script,
 }
 

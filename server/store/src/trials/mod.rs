@@ -1,8 +1,10 @@
 //! Stored trials: actions of a study and their results.
 
+mod label;
 mod trial_counts;
 mod trial_state;
 
+pub use label::Label;
 pub use trial_counts::{SolveTimes, TrialCounts, counts, improvements, measured};
 pub use trial_state::TrialState;
 
@@ -95,11 +97,11 @@ pub struct TrialEnd {
     pub message: String,
 }
 
-/// Outcome of a trial as reported by a script.
+/// The result of a trial that a script reports.
 #[derive(Debug, Clone)]
-pub struct ScriptOutcome {
+pub struct ReportedResult {
     /// Converged or not converged.
-    pub state: TrialState,
+    pub label: Label,
     /// Gait RMSE, rad.
     pub gait_rmse_rad: Option<f64>,
     /// Cost of transport.
@@ -292,19 +294,19 @@ pub async fn open_of(db: &mut Connection, study: StudyId, worker: &str) -> Store
     Ok(row.map(|row| row.try_get(0)).transpose()?)
 }
 
-/// Records the outcome that a script reported.
+/// Records the result that a script reports.
 ///
 /// # Errors
 /// A refusal by a trigger if the trial already has a result; errors of the database.
-pub async fn tell(db: &mut Connection, id: TrialId, outcome: &ScriptOutcome) -> StoreResult<()> {
+pub async fn tell(db: &mut Connection, id: TrialId, result: &ReportedResult) -> StoreResult<()> {
     sqlx::query(
         "update trials set state = ?, gait_rmse_rad = ?, cost_of_transport = ?, message = ?, finished_at = ? \
          where id = ?",
     )
-    .bind(outcome.state.as_str())
-    .bind(outcome.gait_rmse_rad)
-    .bind(outcome.cost_of_transport)
-    .bind(&outcome.message)
+    .bind(result.label.as_str())
+    .bind(result.gait_rmse_rad)
+    .bind(result.cost_of_transport)
+    .bind(&result.message)
     .bind(now())
     .bind(id)
     .execute(db)

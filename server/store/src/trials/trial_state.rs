@@ -48,11 +48,6 @@ impl TrialState {
     pub fn is_open(self) -> bool {
         matches!(self, Self::Queued | Self::Running)
     }
-
-    /// Whether it is a result for the learner: converged or not converged.
-    pub fn is_result(self) -> bool {
-        matches!(self, Self::Converged | Self::NotConverged)
-    }
 }
 
 impl FromStr for TrialState {

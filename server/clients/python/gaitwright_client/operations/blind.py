@@ -16,6 +16,7 @@ from ..schemas import (
     RaterReliability,
     RaterUnblinding,
     StudyId,
+    UnblindedPair,
     UnblindedRater,
 )
 from ..transport import Transport
@@ -97,8 +98,8 @@ class BlindMethods(Transport):
     ) -> UnblindedRater:
         """Unblind a rater.
 
-        Reveals which gait the rater saw on which side. The audit trail records the unblinding, and later answers of the
-        rater do not count as blind.
+        Reveals which gait the rater saw on which side: `GET /studies/{id}/unblinded-pairs` lists it from now on. The
+        audit trail records the unblinding, and later answers of the rater do not count as blind.
 
         Fields: rater, reason.
         """
@@ -111,4 +112,24 @@ class BlindMethods(Transport):
                 body=body,
                 key=idempotency_key,
             ),
+        )
+
+    def list_unblinded_pairs(
+        self,
+        study_id: StudyId,
+        *,
+        rater: Optional[str] = None,
+        page_size: Optional[int] = None,
+    ) -> Pages[UnblindedPair]:
+        """List the pairs of unblinded raters.
+
+        Which gait an unblinded rater saw on which side, and the answer. Oldest first.
+
+        rater: Only the pairs of this rater. Default: those of all unblinded raters.
+        """
+        return Pages(
+            self,
+            "/api/v1/studies/{id}/unblinded-pairs",
+            {"id": study_id},
+            query={"rater": rater, "limit": page_size},
         )

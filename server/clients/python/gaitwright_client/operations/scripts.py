@@ -32,7 +32,7 @@ class ScriptsMethods(Transport):
     ) -> Trial:
         """Ask for a trial to evaluate.
 
-        Returns the same trial until its outcome is reported.
+        Returns the same trial until its result is reported.
 
         Fields: optionally script.
         """
@@ -47,18 +47,18 @@ class ScriptsMethods(Transport):
             ),
         )
 
-    def tell_outcome(
+    def tell_result(
         self,
         trial_id: TrialId,
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[TellRequest],
     ) -> Trial:
-        """Tell the service the outcome of a trial.
+        """Tell the service the result of a trial.
 
-        An outcome without a gait is also a result. If the script fails, cancel the trial instead.
+        That there is no gait is also a result. If the script fails, cancel the trial instead.
 
-        Fields: outcome; optionally cost_of_transport, gait_rmse_rad, reason.
+        Fields: label; optionally cost_of_transport, gait_rmse_rad, reason.
         """
         return cast(
             Trial,

@@ -1,13 +1,15 @@
 //! The form for a new study.
 
 mod chosen_reference;
+mod clone;
 mod fields;
 mod planning;
 mod space_editor;
 
 use self::chosen_reference::ReferenceChoice;
+use self::clone::cloned;
 use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal};
-use self::planning::{cloned, faults, make};
+use self::planning::{faults, make};
 use self::space_editor::SpaceEditor;
 use crate::AppState;
 use crate::accessible::{Named, accessible};

@@ -1,24 +1,16 @@
 //! The study that the form describes: checked, planned and created.
 
+use super::clone::cloned;
 use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal, learner, place_in_form};
 use super::space_editor::SpaceEditor;
-use crate::accessible::Named;
 use gait_optimizer::{LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
-use gaitwright_store::studies::{self, AnswerSource, Study, StudyPlan, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::str::FromStr;
-
-/// The study to clone, if the caller can access it and its subject has not withdrawn consent.
-pub(super) async fn cloned(db: &mut Connection, reach: Reach, fields: &NewStudyFields) -> Result<Option<Study>, Error> {
-    let Some(named) = fields.cloned()? else { return Ok(None) };
-    let id = Named::from(named).accessible(db, reach).await?;
-    consents::may_be_shown(db, id).await?;
-    Ok(Some(studies::get(db, id).await?))
-}
 
 /// Creates the study, and the subject if a new one is entered.
 pub(super) async fn make(

@@ -24,7 +24,7 @@ pub(super) struct AnswerRow {
 /// Answers of users and subjects, newest first. Those of Gait RMSE follow from the table of trials.
 pub(super) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRow> {
     let of_assessment = |id| assessments.iter().any(|assessment| assessment.feedback_id == Some(id));
-    let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Convergence);
+    let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Evaluation);
     let why = |retraction: &Option<Retraction>| Some(format!("retracted: {}", retraction.as_ref()?.reason));
     let cleared = |id| {
         let of_it = |report: &&ReportedGait| report.source == SafetyReportSource::Staff(id);

@@ -18,18 +18,19 @@ use gaitwright_charts::gait_charts;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Caller, RequiredRight, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::analysis::{Analyses, MOST_ANSWERS};
+use gaitwright_service::studies::analysis::{Analyses, too_large_to_wait};
 use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
 use gaitwright_service::studies::lifecycle::{self, StudyTransition, transitions_for_people};
 use gaitwright_service::studies::safety_reports::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::MANY;
 use gaitwright_service::workers::Track;
 use gaitwright_store::studies::{AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
-use gaitwright_store::{Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, jobs, studies, trials};
+use gaitwright_store::{
+    Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, solve_jobs, studies, trials,
+};
 use std::sync::Arc;
 
 /// The part that changes while the study runs.
@@ -177,9 +178,8 @@ pub(super) async fn read_live(
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let counts = trials::counts(&mut reader, id).await?;
-    // The computing time of the learner also grows with the answers.
     let answer_count = feedback::count(&mut reader, id).await? as usize;
-    let large = counts.total as usize >= MANY || answer_count > MOST_ANSWERS;
+    let large = too_large_to_wait(counts.total as usize, answer_count).is_some();
     let snapshot = if large {
         StudySnapshot::newest(&mut reader, study, SHOWN).await?
     } else {
@@ -230,7 +230,7 @@ pub(super) async fn read_live(
     let best = live.best.as_ref().map(|best| (best.id, best.number, best.has_gait));
     live.walker = RecommendedGait::read(app, &live.study, best, &shown).await?;
     if live.running.is_empty() && is_queued && live.study.state == StudyState::Running {
-        live.queued = waits_for_a_worker(jobs::depth_of_others(&mut *app.read().await?, id).await?);
+        live.queued = waits_for_a_worker(solve_jobs::depth_of_others(&mut *app.read().await?, id).await?);
     }
     Ok(live)
 }

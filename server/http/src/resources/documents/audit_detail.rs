@@ -8,6 +8,7 @@ use gaitwright_store::measurement_files::MeasurementKind;
 use gaitwright_store::members::MemberKind;
 use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::Label;
 use gaitwright_store::{EmgResultId, Instant, MeasurementFileId, MemberId, SessionId, StudyId, TrialId};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -94,6 +95,9 @@ pub(crate) struct AuditDetail {
     /// Identifier of the member: `study.member_add`, `study.member_end`.
     #[schema(required = false)]
     member: MemberId,
+    /// `trial.tell`: the label of the trial.
+    #[schema(required = false)]
+    label: Label,
     /// `subject.muscles`: the muscle values.
     #[schema(required = false)]
     muscles: MuscleParameters,
@@ -178,7 +182,7 @@ pub(crate) struct AuditDetail {
     sha256: String,
     /// `study.import`: public key of the signature, hexadecimal. Null without a signature.
     signed_by: Option<String>,
-    /// State, as in `StudyState` (`study.create`, `study.extend`) or `TrialState` (`trial.tell`).
+    /// State, as in `StudyState`: `study.create`, `study.extend`.
     #[schema(required = false)]
     state: String,
     /// `subject.withdraw`: studies that were stopped.

@@ -215,7 +215,7 @@ impl<R: Read> Unpacker<R> {
                     return Err(refuse(format!("it has more than {most} rows of table {table}")));
                 }
                 if found.sha256() != sha256 {
-                    return Err(refuse(format!("row {row}, of table {table}, does not match its hash")));
+                    return Err(refuse(format!("row {row} (table {table}) does not match its hash")));
                 }
                 Ok(Next::Row(table, found))
             }

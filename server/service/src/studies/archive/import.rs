@@ -57,7 +57,8 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
     while let Some((table, row)) = rows.recv().await {
         number += 1;
         let id = row.text("id").or_else(|| row.text("trial_id")).unwrap_or_default();
-        let named = format!("row {number}, of table {table} {id:.36}");
+        let space = if id.is_empty() { "" } else { " " };
+        let named = format!("row {number} (table {table}{space}{id:.36})");
         if let Err(error) = quarantine.add(table, row).await {
             refused = Some(refuse(format!("{named}: {error}")));
             break;

@@ -15,4 +15,4 @@ pub use next_pair::{NextPair, next_pair};
 pub use rater_answers::{AnswerReceipt, HandedOut, RaterAnswer, answer, next, retract};
 pub use rater_answers::{can_be_retracted, own, own_showable_pair, sides_in_words};
 pub use rater_reliability::{RaterReliability, Share, of_study as reliability};
-pub use rater_unblinding::{UnblindedPair, unblind};
+pub use rater_unblinding::{UnblindedPair, unblind, unblinded_pairs};

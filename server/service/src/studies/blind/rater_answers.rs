@@ -18,7 +18,7 @@ use gaitwright_store::blind_pairs::{self, BlindPair, BlindPairKind, NewBlindPair
 use gaitwright_store::feedback::{self, Attribution, Source};
 use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::{
-    BorrowedWriter, Connection, Store, StudyId, TrialId, Writer, consents, events, members, studies, trials,
+    BorrowedWriter, Connection, Store, StudyId, TrialId, Writer, accessible_studies, consents, events, studies, trials,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -304,7 +304,7 @@ pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<
 /// What the record reports, and [`Error::NotFound`] for a code that is not of this rater.
 pub async fn own(db: &mut Connection, caller: &Caller, code: &str) -> Result<PairWithSides, Error> {
     let shown = own_pair(db, caller, code).await?;
-    if !members::reaches(db, caller.reach(), shown.pair.study_id).await? {
+    if !accessible_studies::reaches(db, caller.reach(), shown.pair.study_id).await? {
         return Err(unknown_pair());
     }
     consents::may_be_shown(db, shown.pair.study_id).await?;

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::printable;
 use gaitwright_store::allocations::{self, PairWithSides};
 use gaitwright_store::blind_pairs::{self, BlindPairKind, OrderedAnswer};
-use gaitwright_store::{BlindPairId, Instant, StudyId, TrialId, Writer, audit, consents, studies};
+use gaitwright_store::{BlindPairId, Connection, Instant, StudyId, TrialId, Writer, audit, consents, studies};
 use serde::Serialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -60,7 +60,8 @@ impl From<&PairWithSides> for UnblindedPair {
     }
 }
 
-/// Unblinds a rater: reveals the sides of all pairs. Later answers of the rater do not count as blind.
+/// Unblinds a rater: the sides of all pairs can be read from now on ([`unblinded_pairs`]). Later answers of the rater do
+/// not count as blind.
 ///
 /// # Errors
 /// [`Error::Invalid`] without a reason or for an unknown rater, [`Error::NotFound`], [`Error::Conflict`] if the sides
@@ -71,7 +72,7 @@ pub async fn unblind(
     study: StudyId,
     rater: &str,
     reason: &str,
-) -> Result<Vec<UnblindedPair>, Error> {
+) -> Result<(), Error> {
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
     let reason = printable::reason("reason", reason, ", the reason for unblinding")?;
@@ -79,9 +80,7 @@ pub async fn unblind(
         return Err(Error::invalid("rater", rater, "a rater who was shown a pair of this study"));
     }
     blind_pairs::unblind(writer, study, rater, caller.actor.as_str(), reason).await?;
-    let mut pairs = allocations::of_unblinded_raters(writer, study).await?;
-    pairs.retain(|sided| sided.pair.rater == rater);
-    if pairs.is_empty() {
+    if allocations::page_of_unblinded_raters(writer, study, Some(rater), None, 1).await?.is_empty() {
         return Err(Error::conflict(
             "The archive of this study did not record which gait was on which side in this rater's pairs. \
              Unblind the rater on the system where the study was created.",
@@ -89,5 +88,21 @@ pub async fn unblind(
     }
     let detail = json!({ "rater": rater, "reason": reason });
     audit::append(writer, &caller.actor, "study.unblind_rater", &format!("study {study}"), &detail).await?;
+    Ok(())
+}
+
+/// A page of the pairs of unblinded raters, in the order of the draws.
+///
+/// # Errors
+/// [`Error::NotFound`]; errors of the database.
+pub async fn unblinded_pairs(
+    db: &mut Connection,
+    study: StudyId,
+    rater: Option<&str>,
+    after: Option<BlindPairId>,
+    limit: u32,
+) -> Result<Vec<UnblindedPair>, Error> {
+    studies::get(db, study).await?;
+    let pairs = allocations::page_of_unblinded_raters(db, study, rater, after, limit).await?;
     Ok(pairs.iter().map(UnblindedPair::from).collect())
 }

@@ -4,7 +4,7 @@ use super::super::trial_result;
 use super::Scheduler;
 use crate::error::Error;
 use crate::workers::{Attempt, IN_PROCESS};
-use gaitwright_store::jobs::{self, Lease};
+use gaitwright_store::solve_jobs::{self, Lease};
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::{StoreError, commit, now};
 
@@ -13,7 +13,7 @@ impl Scheduler {
     pub(super) async fn take_back_leases(&self) -> Result<(), Error> {
         let engine = self.0.engine.outlives_process().then_some(IN_PROCESS);
         let mut reader = self.0.store.read().await?;
-        let left = jobs::leased(&mut reader, engine).await?;
+        let left = solve_jobs::leased(&mut reader, engine).await?;
         drop(reader);
         for lease in left {
             self.give_back(&lease).await?;
@@ -23,8 +23,8 @@ impl Scheduler {
 
     pub(super) async fn handle_expired_leases(&self) -> Result<(), Error> {
         let mut reader = self.0.store.read().await?;
-        let expired = jobs::expired(&mut reader, now()).await?;
-        let unstarted = jobs::unstarted_of_inactive_studies(&mut reader).await?;
+        let expired = solve_jobs::expired(&mut reader, now()).await?;
+        let unstarted = solve_jobs::unstarted_of_inactive_studies(&mut reader).await?;
         drop(reader);
         for lease in expired {
             self.handle_expired(&lease).await?;
@@ -44,7 +44,7 @@ impl Scheduler {
         }
         *known = storages;
         self.cancel_solves(self.0.prefetches.forget_running()).await;
-        let leased = jobs::leased(&mut *self.0.store.read().await?, Some(self.0.engine.name())).await?;
+        let leased = solve_jobs::leased(&mut *self.0.store.read().await?, Some(self.0.engine.name())).await?;
         for lease in leased {
             self.replace_unstarted(&lease).await?;
         }
@@ -82,7 +82,7 @@ impl Scheduler {
 
     /// The lease of an attempt. `None` if the record has no such trial, as after a dropped prefetch.
     pub(super) async fn lease_of(&self, attempt: Attempt) -> Result<Option<Lease>, Error> {
-        match jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await {
+        match solve_jobs::lease_of(&mut *self.0.store.read().await?, attempt.trial, attempt.number).await {
             Err(StoreError::Missing { .. }) => {
                 tracing::debug!(trial = %attempt.trial, "ignoring a message about a dropped prefetch");
                 Ok(None)
@@ -99,7 +99,7 @@ impl Scheduler {
     /// Sets the end of a lease. Returns `false` if it has passed to another attempt.
     pub(super) async fn lease_until(&self, lease: &Lease, until: gaitwright_store::Instant) -> Result<bool, Error> {
         let mut writer = self.0.store.write().await?;
-        let ours = jobs::heartbeat(&mut writer, lease, until).await?;
+        let ours = solve_jobs::heartbeat(&mut writer, lease, until).await?;
         commit(writer).await?;
         Ok(ours)
     }

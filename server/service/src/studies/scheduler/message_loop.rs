@@ -7,7 +7,7 @@ use crate::supervise::Task;
 use crate::workers::{AssignmentResult, Attempt, EngineMessage};
 use gait_optimizer::SolveStatus;
 use gaitwright_compute::OnPool;
-use gaitwright_store::{TrialId, commit, events, gaits, jobs, now, trials};
+use gaitwright_store::{TrialId, commit, events, gaits, now, solve_jobs, trials};
 use serde_json::json;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -62,7 +62,7 @@ impl Scheduler {
     pub(super) async fn started(&self, attempt: Attempt, worker: &str) -> Result<(), Error> {
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let mut writer = self.0.store.write().await?;
-        if !jobs::heartbeat(&mut writer, &lease, now().after(self.0.engine.lease())).await? {
+        if !solve_jobs::heartbeat(&mut writer, &lease, now().after(self.0.engine.lease())).await? {
             drop(writer);
             self.cancel_solve(attempt.trial).await;
             return Ok(());

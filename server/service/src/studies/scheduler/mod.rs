@@ -3,12 +3,12 @@
 //! One task plans and dispatches jobs, one receives the messages of workers, one prefetches solves for studies that
 //! wait for an answer. Their decisions depend on the record alone, so the process may end at any instant.
 
-mod job_dispatch;
 mod leases;
 mod message_loop;
 mod planning_loop;
 mod prefetch;
 mod prefetched_solves;
+mod solve_dispatch;
 
 use self::prefetched_solves::Prefetches;
 use super::analysis::Analyses;

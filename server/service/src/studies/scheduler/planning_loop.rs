@@ -10,7 +10,7 @@ use crate::supervise::Task;
 use gaitwright_compute::OnPool;
 use gaitwright_store::studies::{self, AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{NewTrial, TrialState};
-use gaitwright_store::{commit, events, jobs};
+use gaitwright_store::{commit, events, solve_jobs};
 use serde_json::json;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -175,7 +175,7 @@ impl Scheduler {
             self.0.wake.notify_one();
             return Ok(false);
         };
-        jobs::insert(&mut writer, trial).await?;
+        solve_jobs::insert(&mut writer, trial).await?;
         let payload = json!({ "trial_id": trial, "number": new.number, "state": TrialState::Queued });
         events::append(&mut writer, study, "trial_queued", &payload).await?;
         commit(writer).await?;

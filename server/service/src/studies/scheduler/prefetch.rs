@@ -3,8 +3,8 @@
 use super::super::snapshot::StudySnapshot;
 use super::super::solve_input::PackedInput;
 use super::Scheduler;
-use super::job_dispatch::assigned;
 use super::prefetched_solves::LikelyNext;
+use super::solve_dispatch::assigned;
 use crate::error::Error;
 use crate::supervise::Task;
 use crate::workers::Attempt;

@@ -115,15 +115,14 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
     let trial =
         |id: TrialId| trials.get(&id).copied().ok_or_else(|| format!("trial {id} does not belong to this study"));
     match row.content {
-        FeedbackContent::Label { trial: id, category } => {
+        FeedbackContent::Label { trial: id, label } => {
             let state = trial(id)?.state;
-            let converged = state == TrialState::Converged;
-            if !state.is_result() || category != u32::from(converged) {
-                return Err(format!("category {category} does not match the trial state {}", state.as_str()));
+            if state.label() != Some(label) {
+                return Err(format!("the label {} does not match the trial state {}", label.as_str(), state.as_str()));
             }
-            if !matches!(row.source, Source::Convergence | Source::Script) {
+            if row.source != Source::Evaluation {
                 let source = row.source.as_str();
-                return Err(format!("the source of a label is {source}; it must be convergence or script"));
+                return Err(format!("the source of a label is {source}; it must be evaluation"));
             }
         }
         FeedbackContent::Preference { winner: a, loser: b } | FeedbackContent::NoDifference { a, b } => {
@@ -133,7 +132,7 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
                 return Err("it compares a trial that did not converge".to_owned());
             }
             match row.source {
-                Source::Convergence => return Err("a preference cannot have the source convergence".to_owned()),
+                Source::Evaluation => return Err("the source of a preference cannot be evaluation".to_owned()),
                 Source::GaitRmse => {
                     if study.plan.answer_source == AnswerSource::People {
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());

@@ -135,7 +135,7 @@ pub(super) async fn study(quarantine: &mut Quarantine, pool: &Pool) -> Result<Ch
         unchecked_rmse += u32::from(trial.gait_rmse_rad.is_some() && !has_gait);
         at(&what, trial_results::check_results(db, trial).await)?;
     }
-    if let Some(number) = at("jobs", archived_rows::trial_unlike_its_job(db).await)? {
+    if let Some(number) = at("solve_jobs", archived_rows::trial_unlike_its_solve_job(db).await)? {
         return Err(refuse(format!("trial {number}: its state contradicts its job")));
     }
     let by_id: HashMap<TrialId, &Trial> = trials.iter().map(|trial| (trial.id, trial)).collect();

@@ -39,7 +39,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         let none = trial.report.is_none() && trial.status.is_none();
         return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
     }
-    let state = trial.status.and_then(trial_transitions::result_of);
+    let state = trial.status.and_then(trial_transitions::label_of).map(TrialState::from);
     if state != Some(trial.state) {
         let status = serde_json::json!(trial.status);
         return Err(format!("status {status} contradicts the state {}", trial.state.as_str()));

@@ -1,10 +1,10 @@
-//! The queue of solves, with leases.
+//! Solve jobs: the queue of solves, with leases.
 //!
 //! `attempts` is a fencing token: a result counts only if it has the number of the current attempt and the job is still
 //! leased. Late and repeated results are therefore never recorded twice.
 
-use super::members::{reach_values, reached};
-use super::{Connection, Instant, JobId, StoreError, StoreResult, StudyId, TrialId, now};
+use super::accessible_studies::{reach_values, reached};
+use super::{Connection, Instant, SolveJobId, StoreError, StoreResult, StudyId, TrialId, now};
 use crate::accessible_studies::Reach;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lease {
     /// The job.
-    pub job: JobId,
+    pub job: SolveJobId,
     /// Its trial.
     pub trial: TrialId,
     /// Its study.
@@ -60,7 +60,7 @@ pub struct OpenSolve {
 pub async fn open(db: &mut Connection, reach: Reach) -> StoreResult<Vec<OpenSolve>> {
     let (every, open, principal) = reach_values(reach);
     let rows = sqlx::query(concat!(
-        "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id where j.state <> 'done' and ",
+        "select j.*, t.study_id from solve_jobs j join trials t on t.id = j.trial_id where j.state <> 'done' and ",
         reached!("t.study_id")
     ))
     .bind(every)
@@ -76,7 +76,7 @@ pub async fn open(db: &mut Connection, reach: Reach) -> StoreResult<Vec<OpenSolv
 /// # Errors
 /// Errors of the database.
 pub async fn open_of(db: &mut Connection, trial: TrialId) -> StoreResult<Option<OpenSolve>> {
-    let sql = "select j.*, t.study_id from jobs j join trials t on t.id = j.trial_id \
+    let sql = "select j.*, t.study_id from solve_jobs j join trials t on t.id = j.trial_id \
                where j.state <> 'done' and j.trial_id = ?";
     sqlx::query(sql).bind(trial).fetch_optional(db).await?.as_ref().map(open_solve).transpose()
 }
@@ -94,23 +94,23 @@ fn open_solve(row: &SqliteRow) -> StoreResult<OpenSolve> {
     })
 }
 
-/// How many jobs each worker has.
+/// How many solves each worker has.
 ///
 /// # Errors
 /// Errors of the database.
 pub async fn by_worker(db: &mut Connection) -> StoreResult<BTreeMap<String, u32>> {
-    let sql = "select worker, count(*) as jobs from jobs where state <> 'done' and worker is not null group by worker";
+    let sql = "select worker, count(*) as solves from solve_jobs where state <> 'done' and worker is not null group by worker";
     let rows = sqlx::query(sql).fetch_all(db).await?;
-    rows.iter().map(|row| Ok((row.try_get("worker")?, row.try_get("jobs")?))).collect()
+    rows.iter().map(|row| Ok((row.try_get("worker")?, row.try_get("solves")?))).collect()
 }
 
 /// Queues the solve of a trial.
 ///
 /// # Errors
-/// A violated constraint (`jobs_trial_unique`); errors of the database.
+/// A violated constraint (`solve_jobs_trial_unique`); errors of the database.
 pub async fn insert(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
-    sqlx::query("insert into jobs (id, trial_id, state, created_at) values (?, ?, 'queued', ?)")
-        .bind(JobId::fresh())
+    sqlx::query("insert into solve_jobs (id, trial_id, state, created_at) values (?, ?, 'queued', ?)")
+        .bind(SolveJobId::fresh())
         .bind(trial)
         .bind(now())
         .execute(db)
@@ -135,11 +135,11 @@ pub async fn lease(
         return Ok(None);
     }
     let row = sqlx::query(
-        "select j.id, j.trial_id, j.attempts, t.study_id from jobs j \
+        "select j.id, j.trial_id, j.attempts, t.study_id from solve_jobs j \
          join trials t on t.id = j.trial_id join studies s on s.id = t.study_id \
          where j.state = 'queued' and s.state in ('running', 'waiting') and (? is null or s.id = ?) \
          order by s.priority desc, \
-         (select count(*) from jobs k join trials u on u.id = k.trial_id \
+         (select count(*) from solve_jobs k join trials u on u.id = k.trial_id \
           where k.state = 'leased' and u.study_id = t.study_id), j.created_at, j.id limit 1",
     )
     .bind(only)
@@ -153,7 +153,7 @@ pub async fn lease(
         study: row.try_get("study_id")?,
         attempt: row.try_get::<u32, _>("attempts")? + 1,
     };
-    sqlx::query("update jobs set state = 'leased', attempts = ?, worker = ?, lease_until = ? where id = ?")
+    sqlx::query("update solve_jobs set state = 'leased', attempts = ?, worker = ?, lease_until = ? where id = ?")
         .bind(lease.attempt)
         .bind(worker)
         .bind(until)
@@ -168,12 +168,13 @@ pub async fn lease(
 /// # Errors
 /// [`StoreError::Missing`] if the trial has no job; errors of the database.
 pub async fn lease_of(db: &mut Connection, trial: TrialId, attempt: u32) -> StoreResult<Lease> {
-    let row =
-        sqlx::query("select j.id, t.study_id from jobs j join trials t on t.id = j.trial_id where j.trial_id = ?")
-            .bind(trial)
-            .fetch_optional(db)
-            .await?
-            .ok_or_else(|| StoreError::Missing { what: "job for trial", id: trial.to_string() })?;
+    let row = sqlx::query(
+        "select j.id, t.study_id from solve_jobs j join trials t on t.id = j.trial_id where j.trial_id = ?",
+    )
+    .bind(trial)
+    .fetch_optional(db)
+    .await?
+    .ok_or_else(|| StoreError::Missing { what: "job for trial", id: trial.to_string() })?;
     Ok(Lease { job: row.try_get("id")?, trial, study: row.try_get("study_id")?, attempt })
 }
 
@@ -182,7 +183,7 @@ pub async fn lease_of(db: &mut Connection, trial: TrialId, attempt: u32) -> Stor
 /// # Errors
 /// Errors of the database.
 pub async fn heartbeat(db: &mut Connection, lease: &Lease, until: Instant) -> StoreResult<bool> {
-    let done = sqlx::query("update jobs set lease_until = ? where id = ? and attempts = ? and state = 'leased'")
+    let done = sqlx::query("update solve_jobs set lease_until = ? where id = ? and attempts = ? and state = 'leased'")
         .bind(until)
         .bind(lease.job)
         .bind(lease.attempt)
@@ -197,7 +198,7 @@ pub async fn heartbeat(db: &mut Connection, lease: &Lease, until: Instant) -> St
 /// Errors of the database.
 pub async fn finish(db: &mut Connection, lease: &Lease) -> StoreResult<bool> {
     let done = sqlx::query(
-        "update jobs set state = 'done', worker = null, lease_until = null \
+        "update solve_jobs set state = 'done', worker = null, lease_until = null \
          where id = ? and attempts = ? and state = 'leased'",
     )
     .bind(lease.job)
@@ -212,7 +213,7 @@ pub async fn finish(db: &mut Connection, lease: &Lease) -> StoreResult<bool> {
 /// # Errors
 /// Errors of the database.
 pub async fn cancel(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
-    sqlx::query("update jobs set state = 'done', worker = null, lease_until = null where trial_id = ?")
+    sqlx::query("update solve_jobs set state = 'done', worker = null, lease_until = null where trial_id = ?")
         .bind(trial)
         .execute(db)
         .await?;
@@ -223,9 +224,9 @@ pub async fn cancel(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn requeue(db: &mut Connection, job: JobId, failure_counts: FailureCounts) -> StoreResult<()> {
+pub async fn requeue(db: &mut Connection, job: SolveJobId, failure_counts: FailureCounts) -> StoreResult<()> {
     sqlx::query(
-        "update jobs set state = 'queued', worker = null, lease_until = null, failures = ?, losses = ? where id = ?",
+        "update solve_jobs set state = 'queued', worker = null, lease_until = null, failures = ?, losses = ? where id = ?",
     )
     .bind(failure_counts.failures)
     .bind(failure_counts.losses)
@@ -240,10 +241,12 @@ pub async fn requeue(db: &mut Connection, job: JobId, failure_counts: FailureCou
 /// # Errors
 /// Errors of the database.
 pub async fn reopen(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
-    sqlx::query("update jobs set state = 'queued', failures = 0, losses = 0 where trial_id = ? and state = 'done'")
-        .bind(trial)
-        .execute(db)
-        .await?;
+    sqlx::query(
+        "update solve_jobs set state = 'queued', failures = 0, losses = 0 where trial_id = ? and state = 'done'",
+    )
+    .bind(trial)
+    .execute(db)
+    .await?;
     Ok(())
 }
 
@@ -251,8 +254,8 @@ pub async fn reopen(db: &mut Connection, trial: TrialId) -> StoreResult<()> {
 ///
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
-pub async fn failure_counts(db: &mut Connection, job: JobId) -> StoreResult<FailureCounts> {
-    let row = sqlx::query("select failures, losses from jobs where id = ?")
+pub async fn failure_counts(db: &mut Connection, job: SolveJobId) -> StoreResult<FailureCounts> {
+    let row = sqlx::query("select failures, losses from solve_jobs where id = ?")
         .bind(job)
         .fetch_optional(db)
         .await?
@@ -267,7 +270,7 @@ pub async fn failure_counts(db: &mut Connection, job: JobId) -> StoreResult<Fail
 pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
-            "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
+            "select j.id, j.trial_id, j.attempts, t.study_id from solve_jobs j join trials t on t.id = j.trial_id \
              where j.state = 'leased' and j.lease_until < ? order by j.id",
         )
         .bind(at)
@@ -283,7 +286,7 @@ pub async fn expired(db: &mut Connection, at: Instant) -> StoreResult<Vec<Lease>
 pub async fn unstarted_of_inactive_studies(db: &mut Connection) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
-            "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
+            "select j.id, j.trial_id, j.attempts, t.study_id from solve_jobs j join trials t on t.id = j.trial_id \
              join studies s on s.id = t.study_id \
              where j.state = 'leased' and t.state = 'queued' and s.state not in ('running', 'waiting') order by j.id",
         )
@@ -299,7 +302,7 @@ pub async fn unstarted_of_inactive_studies(db: &mut Connection) -> StoreResult<V
 pub async fn leased(db: &mut Connection, engine: Option<&str>) -> StoreResult<Vec<Lease>> {
     leases(
         &sqlx::query(
-            "select j.id, j.trial_id, j.attempts, t.study_id from jobs j join trials t on t.id = j.trial_id \
+            "select j.id, j.trial_id, j.attempts, t.study_id from solve_jobs j join trials t on t.id = j.trial_id \
              where j.state = 'leased' and (? is null or j.worker = ?) order by j.id",
         )
         .bind(engine)
@@ -315,8 +318,8 @@ pub async fn leased(db: &mut Connection, engine: Option<&str>) -> StoreResult<Ve
 /// Errors of the database.
 pub async fn depth(db: &mut Connection) -> StoreResult<(u32, u32)> {
     let row = sqlx::query(
-        "select (select count(*) from jobs where state = 'queued') as queued, \
-                (select count(*) from jobs where state = 'leased') as leased",
+        "select (select count(*) from solve_jobs where state = 'queued') as queued, \
+                (select count(*) from solve_jobs where state = 'leased') as leased",
     )
     .fetch_one(db)
     .await?;
@@ -330,7 +333,7 @@ pub async fn depth(db: &mut Connection) -> StoreResult<(u32, u32)> {
 pub async fn depth_of_others(db: &mut Connection, study: StudyId) -> StoreResult<(u32, u32)> {
     let row = sqlx::query(
         "select coalesce(sum(j.state = 'queued'), 0) as queued, coalesce(sum(j.state = 'leased'), 0) as leased \
-         from jobs j join trials t on t.id = j.trial_id where j.state in ('queued', 'leased') and t.study_id <> ?",
+         from solve_jobs j join trials t on t.id = j.trial_id where j.state in ('queued', 'leased') and t.study_id <> ?",
     )
     .bind(study)
     .fetch_one(db)

@@ -1,4 +1,4 @@
-//! Dispatch of jobs: leases a queued job and submits its solve to the engine.
+//! Dispatch of solve jobs: leases a queued job and submits its solve to the engine.
 
 use super::super::solve_input::{PackedInput, SolveInput};
 use super::super::trial_result;
@@ -7,7 +7,7 @@ use super::prefetched_solves::{PREPARED, Prepared};
 use crate::dispatch_error::DispatchError;
 use crate::error::Error;
 use crate::workers::{Assignment, Attempt};
-use gaitwright_store::jobs::{self, Lease};
+use gaitwright_store::solve_jobs::{self, Lease};
 use gaitwright_store::{Store, TrialId, commit, now, trials};
 
 impl Scheduler {
@@ -22,13 +22,14 @@ impl Scheduler {
     pub(super) async fn lease(&self) -> Result<Option<Lease>, Error> {
         let engine = &self.0.engine;
         // This runs on every change, so it must not occupy the only writer.
-        let (queued, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        let (queued, leased) = solve_jobs::depth(&mut *self.0.store.read().await?).await?;
         if queued == 0 || leased as usize >= engine.size() || engine.problem().is_some() {
             return Ok(None);
         }
         let mut writer = self.0.store.write().await?;
         let until = now().after(engine.lease());
-        let Some(lease) = jobs::lease(&mut writer, engine.name(), until, self.0.only, engine.size()).await? else {
+        let Some(lease) = solve_jobs::lease(&mut writer, engine.name(), until, self.0.only, engine.size()).await?
+        else {
             return Ok(None);
         };
         commit(writer).await?;
@@ -71,7 +72,7 @@ impl Scheduler {
 
     /// Number of dispatched solves, prefetches included.
     pub(super) async fn busy(&self) -> Result<usize, Error> {
-        let (_, leased) = jobs::depth(&mut *self.0.store.read().await?).await?;
+        let (_, leased) = solve_jobs::depth(&mut *self.0.store.read().await?).await?;
         Ok(leased as usize + self.0.prefetches.running())
     }
 

@@ -1,4 +1,4 @@
-//! Server-sent event streams, whose listeners are authorised again while the stream runs.
+//! The listener of a stream of events, authorised again while the stream runs.
 //!
 //! Each stream checks its listener before every event, and every second without events. It ends when the session or
 //! token expires, when the user is disabled or loses the right or the access to the study, and when the subject
@@ -15,7 +15,7 @@ use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
 use gaitwright_service::access::RequiredRight;
-use gaitwright_store::{StudyId, consents, members};
+use gaitwright_store::{StudyId, accessible_studies, consents};
 use std::convert::Infallible;
 use std::marker::PhantomData;
 use std::time::{Duration, Instant};
@@ -98,7 +98,7 @@ impl<P: RequiredRight> StudyListener<P> {
         let Ok(Some(caller)) = self.credential.caller(&self.app).await else { return false };
         let Ok(mut reader) = self.app.read().await else { return false };
         caller.may(P::NEEDED)
-            && members::reaches(&mut reader, caller.reach(), self.study).await.is_ok_and(|reaches| reaches)
+            && accessible_studies::reaches(&mut reader, caller.reach(), self.study).await.is_ok_and(|reaches| reaches)
             && consents::may_be_shown(&mut reader, self.study).await.is_ok()
     }
 }
