@@ -31,7 +31,8 @@ fn round_levels((low, high): (f64, f64)) -> Vec<f64> {
     let power = 10_f64.powf(((high - low) / 10.0).log10().floor());
     let steps = [1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0].map(|round| round * power);
     let between = |step: f64| {
-        let levels = ((low / step).floor() as i64..=(high / step).ceil() as i64).map(|i| i as f64 * step);
+        // The smallest step is at least a hundredth of the range.
+        let levels = (0..=101).map(|place| ((low / step).floor() + f64::from(place)) * step);
         levels.filter(|level| *level > low && *level < high).collect::<Vec<_>>()
     };
     let is_shown = |step: &f64| {
