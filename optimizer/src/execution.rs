@@ -33,7 +33,6 @@ mod simulation_tests;
 pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYield, SurvivedPushes};
 
 use crate::cancel_token::CancelToken;
-use crate::certificate::CertifiedGait;
 use crate::gait::Gait;
 use crate::model_error::ModelError;
 use disturbance::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
@@ -112,7 +111,8 @@ pub fn simulate(
     cancel: &CancelToken,
 ) -> Result<Option<ExecutionReport>, ModelError> {
     options.validate()?;
-    let gait_sha256 = CertifiedGait::of(gait)?.gait_sha256;
+    gait.validate()?;
+    let gait_sha256 = gait.sha256()?;
     let walker = SimulatedWalker::new(gait)?;
     let strides = options.strides;
     let undisturbed = walker.walk(&Disturbance::none(), strides)?;

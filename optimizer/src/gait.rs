@@ -7,6 +7,7 @@ use crate::subject::Subject;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
 
+mod gait_hash;
 mod kept_clearance;
 pub(crate) mod motion;
 mod phase_progress;

@@ -368,13 +368,15 @@ async fn study_without_answers_has_no_best_action() {
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert!(page.contains("No answers yet") && !page.contains("best action so far") && !page.contains(">best<"));
+    assert!(
+        page.contains("No answers from people yet") && !page.contains("best action so far") && !page.contains(">best<")
+    );
     let trials = service.trials(study).await;
     let (new, old) = (trials[trials.len() - 1].id, trials[trials.len() - 2].id);
     let body = json!({"trial_a": new, "trial_b": old, "answer": "a"});
     service.post(&format!("/api/v1/studies/{study}/preferences"), &body).await;
     let page = service.fetch(&format!("/studies/{study}")).await.text;
-    assert!(!page.contains("No answers yet") && page.contains("best action so far"));
+    assert!(!page.contains("No answers from people yet") && page.contains("best action so far"));
     service.stop().await;
 }
 

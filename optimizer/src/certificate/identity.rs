@@ -9,7 +9,6 @@ use crate::settings::GaitSettings;
 use crate::subject::Subject;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 
 /// The gait that a certificate is about. Everything here is computed from the gait.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,9 +49,8 @@ impl CertifiedGait {
     pub fn of(gait: &Gait) -> Result<Self, ModelError> {
         gait.validate()?;
         let total_mass_kg = WalkerModel::new(&gait.subject, &gait.device)?.total_mass;
-        let text = serde_json::to_vec(gait).map_err(|e| unreadable("gait", &e))?;
         Ok(Self {
-            gait_sha256: hexadecimal(&Sha256::digest(&text)),
+            gait_sha256: gait.sha256()?,
             optimizer_version: env!("CARGO_PKG_VERSION").to_owned(),
             subject: gait.subject,
             device: gait.device.name.clone(),
@@ -82,11 +80,6 @@ impl Difference {
         let words = |value: &Value| if value.is_null() { missing.to_owned() } else { value.to_string() };
         format!("{} is {} (built-in: {})", self.name, words(&self.value), words(&self.built_in))
     }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    let digit = |value: u8| char::from_digit(u32::from(value), 16).unwrap_or_default();
-    bytes.iter().flat_map(|byte| [digit(byte >> 4), digit(byte & 15)]).collect()
 }
 
 fn unreadable(what: &str, error: &serde_json::Error) -> ModelError {

@@ -1,7 +1,7 @@
 //! `gaitwright config`.
 
 use super::output::data;
-use super::settings::{Flags, Settings};
+use super::settings::{Flags, Settings, without_password};
 use clap::{Args, Subcommand};
 use gaitwright_service::error::Error;
 
@@ -33,26 +33,5 @@ impl ConfigCommand {
             data(&format!("{name} = {:?}  # {origin}; {meaning}", without_password(value)))?;
         }
         Ok(())
-    }
-}
-
-/// The address without the user and password in it.
-fn without_password(text: &str) -> String {
-    let Some((scheme, rest)) = text.split_once("://") else { return text.to_owned() };
-    match rest.rsplit_once('@') {
-        Some((_, host)) => format!("{scheme}://...@{host}"),
-        None => text.to_owned(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn passwords_in_addresses_are_hidden() {
-        assert_eq!(without_password("nats://lab:s3@cret@broker:4222"), "nats://...@broker:4222");
-        assert_eq!(without_password("nats://broker:4222"), "nats://broker:4222");
-        assert_eq!(without_password("warn,gaitwright=info"), "warn,gaitwright=info");
     }
 }

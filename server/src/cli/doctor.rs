@@ -37,7 +37,11 @@ impl DoctorCommand {
         let mut checks = vec![
             ("program", program()),
             ("kernels", Good(format!("vector instructions: {}", interior_point::vector_instructions()))),
-            ("disk", disk(&database, settings.reserve_bytes()?)),
+            ("settings", of_service(settings)),
+            (
+                "disk",
+                settings.reserve_bytes().map_or_else(|e| Trouble(e.to_string()), |reserve| disk(&database, reserve)),
+            ),
         ];
         if database.exists() {
             checks.push(("record", record(&database, settings.anchor().as_slice()).await));
@@ -46,7 +50,7 @@ impl DoctorCommand {
             checks.push(("record", Good(format!("no record yet at {}", database.display()))));
             checks.push(("clock", Good(now().to_string())));
         }
-        checks.push(("broker", broker(settings).await?));
+        checks.push(("broker", broker(settings).await));
         for (what, found) in &checks {
             let (state, text) = match found {
                 Good(text) => ("ok", text),
@@ -98,20 +102,57 @@ async fn clock_after(database: &Path) -> CheckOutcome {
             Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
         }
         Ok(_) => Good(present.to_string()),
+        // The check of the record has the error.
+        Err(_) => Good(format!("{present}, not compared with the record")),
+    }
+}
+
+/// Whether `gaitwright serve` would start with the settings.
+fn of_service(settings: &Settings) -> CheckOutcome {
+    let read = || -> Result<(), Error> {
+        settings.listen()?;
+        settings.sign_in()?;
+        settings.proxies()?;
+        settings.workers()?;
+        settings.session_limits()?;
+        settings.connections()?;
+        settings.access_log_days()?;
+        settings.log()?;
+        Ok(())
+    };
+    let files = || -> Result<(), Error> {
+        if let Some((certificate, key)) = settings.tls()? {
+            for (name, file) in [("tls_certificate", certificate), ("tls_key", key)] {
+                if !file.is_file() {
+                    return Err(settings.refused(name, "an existing file"));
+                }
+            }
+        }
+        if settings.backups()?.is_some_and(|plan| !plan.folder.is_dir()) {
+            return Err(settings.refused("backup_folder", "an existing folder"));
+        }
+        let folder = settings.anchor().and_then(|anchor| anchor.parent().map(Path::to_owned));
+        if folder.is_some_and(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+            return Err(settings.refused("anchor", "a file in an existing folder"));
+        }
+        Ok(())
+    };
+    match read().and_then(|()| files()) {
+        Ok(()) => Good("the service can start with them".to_owned()),
         Err(error) => Trouble(error.to_string()),
     }
 }
 
 #[cfg_attr(not(feature = "nats"), allow(clippy::unused_async, reason = "only the check of a broker waits"))]
-async fn broker(settings: &Settings) -> Result<CheckOutcome, Error> {
-    match settings.nats()? {
+async fn broker(settings: &Settings) -> CheckOutcome {
+    match settings.nats() {
         #[cfg(feature = "nats")]
-        Some((url, _)) => Ok(match nats::reach(url).await {
+        Ok(Some((url, _))) => match nats::reach(url).await {
             Ok(version) => Good(format!("NATS {version} with JetStream")),
             Err(error) => Trouble(error.to_string()),
-        }),
-        #[cfg(not(feature = "nats"))]
-        Some((url, _)) => Ok(Trouble(format!("{url} is set, but this program was built without NATS"))),
-        None => Ok(Good("no NATS broker is set".to_owned())),
+        },
+        // A program without NATS refuses a broker in the settings.
+        Ok(_) => Good("no NATS broker is set".to_owned()),
+        Err(error) => Trouble(error.to_string()),
     }
 }

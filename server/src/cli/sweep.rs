@@ -42,7 +42,7 @@ pub(super) struct SweepCommand {
 const COLUMNS: [&str; 6] =
     ["status", "iterations", "seconds_total", "cost_of_transport", "gait_rmse_rad", "max_violation"];
 
-type Answer = Result<SolveOutcome, SolveError>;
+type SweepResult = Result<SolveOutcome, SolveError>;
 
 impl SweepCommand {
     pub(super) async fn run(self) -> Result<CommandEnd, Error> {
@@ -90,7 +90,7 @@ impl SweepTable {
         table
     }
 
-    fn add(&mut self, action: &TunedBounds, answer: Answer) {
+    fn add(&mut self, action: &TunedBounds, answer: SweepResult) {
         let mut row: Vec<CsvCell> = action.to_array().iter().map(CsvCell::from).collect();
         match answer {
             Ok(outcome) => {
@@ -206,7 +206,7 @@ fn solve_all(
             });
         }
         drop(sender);
-        let mut early: BTreeMap<usize, Answer> = BTreeMap::new();
+        let mut early: BTreeMap<usize, SweepResult> = BTreeMap::new();
         let mut due = 0;
         for (row, answer) in receiver {
             bar.inc(1);

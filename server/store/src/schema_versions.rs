@@ -100,3 +100,14 @@ async fn version(pool: &SqlitePool) -> StoreResult<i64> {
     let row = sqlx::query("select coalesce(max(version), 0) from _sqlx_migrations").fetch_one(pool).await?;
     Ok(row.try_get(0)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::FILES;
+
+    /// A record keeps the hash of each migration, so that a converted text would be another migration.
+    #[test]
+    fn migrations_have_the_same_line_endings_on_every_machine() {
+        assert!(FILES.iter().all(|(_, _, text)| !text.contains('\r')));
+    }
+}

@@ -143,5 +143,5 @@ pub(super) fn portraits(cycle: &Cycle<'_>) -> Group {
     let mut charts: Vec<Chart> = JOINTS.iter().enumerate().map(joint).collect();
     charts.push(with(Chart::new("Torso lean", angle, velocity), "torso", 7, Stroke::Solid, 2));
     let hint = "Joint angle and velocity over the stride. A closed curve is a periodic motion; a gap is an impact.";
-    Group::new("portraits", "Phase portraits", hint, charts)
+    Group::new("portraits", "Limit cycles", hint, charts)
 }

@@ -45,6 +45,7 @@ def follow(
     headers = {"accept": "text/event-stream"}
     failures = 0
     while True:
+        broke = False
         try:
             with transport.open(transport.request("GET", path, at, query, headers)) as stream:
                 for event in parse(stream):
@@ -53,10 +54,13 @@ def follow(
                         headers["last-event-id"] = str(event.id)
                     yield event
         except Problem as problem:
+            broke = True
             if problem.status not in NOT_READY or failures + 1 >= transport.tries:
                 raise
         except (OSError, http.client.HTTPException):
+            broke = True
             if failures + 1 >= transport.tries:
                 raise
-        time.sleep(min(0.2 * 2**failures, 10))
-        failures += 1
+        # A proxy may end a quiet stream again and again, which is no failure.
+        failures = failures + 1 if broke else 0
+        time.sleep(0.1 * 2 ** min(failures, 6))

@@ -25,7 +25,10 @@ def until(
     timeout_s: Optional[float],
     poll_s: float,
 ) -> T:
-    """Gets an object until it has ended, and passes each change to `progress`."""
+    """Gets an object until it has ended, and passes each change to `progress`.
+
+    `timeout_s` ends the wait between two requests; a request that is under way is not cut off.
+    """
     begun = time.monotonic()
     last: Optional[T] = None
     while True:

@@ -78,7 +78,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(preferences::of_study, preferences::create))
         .routes(routes!(preferences::of_study_csv))
         .routes(routes!(events::of_study))
-        // who reaches a study
+        // members of a study and access to it
         .routes(routes!(members::of_study, members::add))
         .routes(routes!(members::get))
         .routes(routes!(members::end))
@@ -116,7 +116,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(blind::raters))
         .routes(routes!(blind::unblind))
         .routes(routes!(blind::unblinded_pairs))
-        // in the lab
+        // lab sessions
         .routes(routes!(lab_sessions::of_study, lab_sessions::create))
         .routes(routes!(lab_sessions::get))
         .routes(routes!(walk_controller_files::controller))

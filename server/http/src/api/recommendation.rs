@@ -58,7 +58,7 @@ struct Recommended {
     trial_id: TrialId,
     /// Number of the trial.
     number: u32,
-    /// The action: values of the bounds a1 to a8, tuned or fixed.
+    /// The action: the values of all bounds, tuned or fixed.
     #[schema(value_type = study_plan_schemas::BoundsSchema)]
     bounds: TunedBounds,
     /// Gait RMSE of the trial, rad. Null if the script that evaluated the trial did not report it.

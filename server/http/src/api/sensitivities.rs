@@ -24,7 +24,7 @@ pub(super) struct TrialSensitivities {
     sentences: Vec<String>,
     /// Mechanical cost of transport of the gait.
     cost_of_transport: f64,
-    /// One entry for each tuned bound, a1 to a8.
+    /// One entry for each bound that can be tuned.
     bounds: Vec<SensitivityToBound>,
 }
 

@@ -21,7 +21,7 @@ pub(crate) struct Trial {
     /// Index of the action in the search space.
     #[schema(value_type = u64)]
     action_index: ActionIndex,
-    /// The action: values of the bounds a1 to a8, tuned or fixed.
+    /// The action: the values of all bounds, tuned or fixed.
     #[schema(value_type = study_plan_schemas::BoundsSchema)]
     action: TunedBounds,
     /// Reason for the trial.

@@ -1,6 +1,6 @@
 //! Collects the safety reports and the "cannot tell" answers of a study from all places where people give them.
 
-use super::same_motion::GaitMotion;
+use super::same_motion::MotionIdentity;
 use crate::access::Reach;
 use gait_optimizer::TunedBounds;
 use gaitwright_store::blind_pairs::OrderedAnswer;
@@ -86,12 +86,12 @@ pub struct ReportedMotion {
     number: u32,
     /// Whether its study has the device of the study for which the reports were read.
     same_device: bool,
-    motion: Option<GaitMotion>,
+    motion: Option<MotionIdentity>,
 }
 
 impl ReportedMotion {
     /// Whether the report is about this motion of a trial of the study for which the reports were read.
-    fn has(&self, motion: &GaitMotion) -> bool {
+    fn has(&self, motion: &MotionIdentity) -> bool {
         self.motion.as_ref().is_some_and(|own| {
             if self.same_device { own.is_same(motion) } else { own.is_same_with_another_device(motion) }
         })
@@ -148,7 +148,7 @@ impl SafetyReports {
     ) -> StoreResult<()> {
         for report in reports {
             let trial = trials::get(db, report.trial).await?;
-            let (number, motion) = (trial.number, GaitMotion::of(&trial));
+            let (number, motion) = (trial.number, MotionIdentity::of(&trial));
             self.motions.push(ReportedMotion { report, study, number, same_device, motion });
         }
         Ok(())
@@ -254,7 +254,7 @@ impl SafetyReports {
         }
         let own = self.motions.iter().find(|motion| motion.report.trial == trial.id);
         own.or_else(|| {
-            GaitMotion::of(trial).and_then(|motion| self.motions.iter().find(|reported| reported.has(&motion)))
+            MotionIdentity::of(trial).and_then(|motion| self.motions.iter().find(|reported| reported.has(&motion)))
         })
     }
 
@@ -262,7 +262,7 @@ impl SafetyReports {
     /// again, because the subject may walk in its evaluation.
     pub fn reported_bounds(&self) -> impl Iterator<Item = TunedBounds> {
         let on_device = self.motions.iter().filter(|motion| motion.same_device);
-        on_device.filter_map(|reported| reported.motion.as_ref()).map(GaitMotion::bounds)
+        on_device.filter_map(|reported| reported.motion.as_ref()).map(MotionIdentity::bounds)
     }
 
     /// Whether the gait of this trial has a report in force.

@@ -13,7 +13,7 @@ const TOLERANCE_S: f64 = 1e-4;
 
 /// What identifies the gait of a trial, in whichever study of the subject it was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GaitMotion {
+pub struct MotionIdentity {
     known_by: KnownBy,
     bounds: TunedBounds,
 }
@@ -26,7 +26,7 @@ enum KnownBy {
     Bounds,
 }
 
-impl GaitMotion {
+impl MotionIdentity {
     /// The motion of a trial; `None` if the trial has no gait.
     pub fn of(trial: &Trial) -> Option<Self> {
         let known_by =
@@ -84,7 +84,8 @@ impl MotionResults {
 
 /// Whether two trials of a study have the same gait.
 pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
-    one.id == other.id || GaitMotion::of(one).zip(GaitMotion::of(other)).is_some_and(|(one, other)| one.is_same(&other))
+    one.id == other.id
+        || MotionIdentity::of(one).zip(MotionIdentity::of(other)).is_some_and(|(one, other)| one.is_same(&other))
 }
 
 #[cfg(test)]
@@ -94,8 +95,8 @@ mod tests {
     const RESULTS: MotionResults =
         MotionResults { cost_of_transport: 0.07, stride_length_m: 1.31, vhip_m_s: [1.0; 4], durations_s: [0.1; 8] };
 
-    fn motion(known_by: KnownBy, a1: f64) -> GaitMotion {
-        GaitMotion { known_by, bounds: TunedBounds { a1, ..TunedBounds::default() } }
+    fn motion(known_by: KnownBy, a1: f64) -> MotionIdentity {
+        MotionIdentity { known_by, bounds: TunedBounds { a1, ..TunedBounds::default() } }
     }
 
     #[test]

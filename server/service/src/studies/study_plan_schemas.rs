@@ -19,7 +19,7 @@ pub struct SolveOptionsSchema(pub BTreeMap<String, Value>);
 #[schema(as = LearnerSettings)]
 pub struct LearnerSettingsSchema(pub BTreeMap<String, Value>);
 
-/// Values of the bounds a1 to a8.
+/// Values of the bounds that can be tuned.
 #[derive(Debug, ToSchema)]
 #[schema(as = Bounds)]
 pub struct BoundsSchema(pub BTreeMap<String, Value>);

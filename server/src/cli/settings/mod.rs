@@ -6,8 +6,10 @@ mod known_settings;
 mod setting_origin;
 mod settings_file;
 mod values;
+mod without_password;
 
 pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
+pub(super) use without_password::without_password;
 
 use gaitwright_service::error::Error;
 use known_settings::KNOWN;
@@ -71,7 +73,7 @@ impl Settings {
     /// The error for a setting, with its origin.
     pub(super) fn refused(&self, name: &str, allowed: &str) -> Error {
         let origin = self.0.get(name).map_or(&SettingOrigin::Default, |(_, origin)| origin);
-        Error::invalid(&format!("{name} ({origin})"), self.text(name), allowed)
+        Error::invalid(&format!("{name} ({origin})"), without_password(self.text(name)), allowed)
     }
 
     /// Every setting: its name, value, origin and meaning.

@@ -18,7 +18,7 @@ pub(crate) struct GaitDocument {
     device: DeviceDefinition,
     /// Whether the gait has muscles.
     muscles: bool,
-    /// The bounds a1 to a8.
+    /// The values of the bounds that can be tuned.
     bounds: BoundsSchema,
     /// The other settings of the gait problem.
     settings: GaitSettingsSchema,

@@ -27,7 +27,7 @@ struct GaitProblem {
     subject: WalkerSubject,
     /// The device.
     device: DeviceDefinition,
-    /// The bounds a1 to a8.
+    /// The values of the bounds that can be tuned.
     bounds: BoundsSchema,
     /// Whether the problem has muscles.
     muscles: bool,
