@@ -3,11 +3,12 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod skipped;
+
 use gait_optimizer::{
     CancelToken, GaitProblem, GaitSettings, InitialGuess, Mesh, SolveOptions, SolveStatus, Subject, TunedBounds,
     solve_from_guesses,
 };
-use std::io::Write;
 
 /// Bounds far tighter than Table I (Li et al. 2022); in each case one or two of them are infeasible.
 const WITHOUT_A_GAIT: [&str; 12] = [
@@ -30,7 +31,7 @@ const MAY_GIVE_UP: usize = 1;
 
 #[test]
 fn infeasible_solves_end_at_stationary_points_of_the_violation() {
-    let long = std::env::var_os("GAITWRIGHT_LONG_TESTS").is_some();
+    let long = !skipped::long_tests_are_skipped(" for all but six starts on a coarse mesh");
     let options = SolveOptions { threads: 2, ..SolveOptions::default() };
     let mut gave_up = Vec::new();
     let guesses = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE];
@@ -65,12 +66,7 @@ fn infeasible_solves_end_at_stationary_points_of_the_violation() {
 /// Near the boundary of feasibility steps become very short, and the restoration phase must take over.
 #[test]
 fn long_nearly_infeasible_solve_ends_before_its_iteration_limit() {
-    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        // Writes to stderr directly, because the test harness captures `eprintln`.
-        let _ = writeln!(
-            std::io::stderr(),
-            "long_nearly_infeasible_solve_ends_before_its_iteration_limit: skipped: set GAITWRIGHT_LONG_TESTS=1"
-        );
+    if skipped::long_tests_are_skipped("") {
         return;
     }
     let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), true).unwrap();

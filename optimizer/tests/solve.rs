@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
+mod skipped;
+
 use gait_optimizer::body::{Axis, Side};
 use gait_optimizer::certificate::certify;
 use gait_optimizer::explanation::explain;
@@ -12,7 +14,6 @@ use gait_optimizer::{
     CancelToken, Gait, GaitProblem, GaitResults, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
     TunedBounds, WarmStart, solve,
 };
-use std::io::Write;
 use std::sync::LazyLock;
 
 fn problem(bounds: &str) -> GaitProblem {
@@ -281,12 +282,7 @@ fn converged_solve_has_no_explanation() {
 
 #[test]
 fn explanation_names_relaxations_that_give_a_gait() {
-    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        // Writes to stderr directly, because the test harness captures `eprintln`.
-        let _ = writeln!(
-            std::io::stderr(),
-            "explanation_names_relaxations_that_give_a_gait: skipped: set GAITWRIGHT_LONG_TESTS=1"
-        );
+    if skipped::long_tests_are_skipped("") {
         return;
     }
     let bounds = "a2=40,a3=0.5,a4=1.2,a5=0.1,a6=0,a7=15,a8=15";
