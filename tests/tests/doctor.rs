@@ -40,9 +40,9 @@ fn doctor_describes_a_machine_without_a_record_and_creates_nothing() {
     let (code, lines) = doctor(folder.path(), &[]);
     assert_eq!(code, Some(0), "{lines:?}");
     let said: Vec<&str> = lines.iter().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
-    assert_eq!(said, ["program", "kernels", "disk", "record", "clock", "broker"]);
+    assert_eq!(said, ["program", "kernels", "settings", "disk", "record", "clock", "broker"]);
     assert!(lines.iter().all(|line| line.starts_with("ok ")), "{lines:?}");
-    assert!(lines[3].contains("no record yet at"), "{lines:?}");
+    assert!(lines[4].contains("no record yet at"), "{lines:?}");
     assert!(cli::files(folder.path()).is_empty());
 }
 
@@ -51,7 +51,7 @@ async fn doctor_reports_a_clock_that_was_set_back() {
     let (folder, database) = filled().await;
     let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
     assert_eq!(code, Some(0), "{lines:?}");
-    assert!(lines[3].contains("a.db is intact"), "{lines:?}");
+    assert!(lines[4].contains("a.db is intact"), "{lines:?}");
     let store = Store::open(&database).await.unwrap();
     let mut writer = store.write().await.unwrap();
     access_clock::reach(&mut writer, "2099-01-01T00:00:00.000Z".parse().unwrap()).await.unwrap();
@@ -84,5 +84,27 @@ fn doctor_reports_the_version_of_a_reachable_broker() {
     let folder = tempfile::tempdir().unwrap();
     // The process may not listen yet.
     let found = (0..100).map(|_| doctor(folder.path(), &["--nats", &broker.url()])).find(|(code, _)| *code == Some(0));
-    assert!(found.unwrap().1[5].contains("with JetStream"));
+    assert!(found.unwrap().1[6].contains("with JetStream"));
+}
+
+#[test]
+fn doctor_names_settings_with_which_the_service_does_not_start() {
+    let folder = tempfile::tempdir().unwrap();
+    for (flags, named) in [
+        (&["--listen", "nonsense"][..], "listen"),
+        (&["--backup-folder", "missing"], "backup_folder"),
+        (&["--anchor", "missing/anchor"], "anchor"),
+        (&["--tls-certificate", "missing", "--tls-key", "missing"], "tls_certificate"),
+    ] {
+        let found = only_error(doctor(folder.path(), flags));
+        assert!(found.starts_with("error") && found.contains(named), "{found}");
+    }
+}
+
+#[test]
+fn doctor_prints_no_password_of_a_refused_setting() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, lines) = doctor(folder.path(), &["--nats", "http://lab:s3cret@broker:4222"]);
+    assert_eq!(code, Some(1), "{lines:?}");
+    assert!(!lines.join("\n").contains("s3cret"), "{lines:?}");
 }

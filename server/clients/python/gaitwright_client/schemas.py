@@ -619,7 +619,7 @@ class BoundValue(TypedDict):
 
 
 class Bounds(TypedDict):
-    """Values of the bounds a1 to a8."""
+    """Values of the bounds that can be tuned."""
 
     # Maximum coordinate velocity, rad/s.
     a1: float
@@ -1219,7 +1219,7 @@ class FloquetMultiplier(TypedDict):
 class GaitDocument(TypedDict):
     """A gait: eight domains over one stride from right heel strike. R is the prosthesis, L the intact leg."""
 
-    # The bounds a1 to a8.
+    # The values of the bounds that can be tuned.
     bounds: Bounds
     # The device.
     device: DeviceDefinition
@@ -1260,7 +1260,7 @@ class GaitMotion(TypedDict):
 class GaitProblem(TypedDict):
     """The definition of a gait problem."""
 
-    # The bounds a1 to a8.
+    # The values of the bounds that can be tuned.
     bounds: Bounds
     # The device.
     device: DeviceDefinition
@@ -2525,7 +2525,7 @@ class RaterUnblinding(TypedDict):
 
 
 class _RecommendedRequired(TypedDict):
-    # The action: values of the bounds a1 to a8, tuned or fixed.
+    # The action: the values of all bounds, tuned or fixed.
     bounds: Bounds
     # Number of the trial.
     number: int
@@ -3314,7 +3314,7 @@ class TightenedBounds(TypedDict):
 
 
 class _TrialRequired(TypedDict):
-    # The action: values of the bounds a1 to a8, tuned or fixed.
+    # The action: the values of all bounds, tuned or fixed.
     action: Bounds
     # Index of the action in the search space.
     action_index: int
@@ -3435,7 +3435,7 @@ class TrialExplanation(TypedDict):
 class TrialSensitivities(TypedDict):
     """Sensitivities of a gait with respect to the tuned bounds."""
 
-    # One entry for each tuned bound, a1 to a8.
+    # One entry for each bound that can be tuned.
     bounds: list[SensitivityToBound]
     # Mechanical cost of transport of the gait.
     cost_of_transport: float
