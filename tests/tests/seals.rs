@@ -127,7 +127,7 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
         ("blind_pairs" | "trials" | "lab_sessions", "number") => format!("{column} + 1000"),
         (_, "hash" | "code") => "hex(randomblob(32))".to_owned(),
         ("feedback", "kind") => "'no_difference'".to_owned(),
-        (_, "id" | "sha256" | "pseudonym" | "name") | ("jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
+        (_, "id" | "sha256" | "pseudonym" | "name") | ("solve_jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
         (_, column) if column == last => "hex(randomblob(8))".to_owned(),
         (_, column) => column.to_owned(),
     };
@@ -241,7 +241,7 @@ async fn later_change_does_not_seal_a_row_of_another_program() {
         ("sessions", "update sessions set by_link = 1 - by_link", "delete from sessions"),
         ("sign_in_links", "update sign_in_links set expires_at = '9999'", "update sign_in_links set used_at = '2000'"),
         ("sign_in_links", "update sign_in_links set expires_at = '9999'", "delete from sign_in_links"),
-        ("jobs", "update jobs set failures = failures + 1", "update jobs set state = state"),
+        ("solve_jobs", "update solve_jobs set failures = failures + 1", "update solve_jobs set state = state"),
         ("idempotency_keys", "update idempotency_keys set body = 'x'", "delete from idempotency_keys"),
     ] {
         let copy = folder.path().join("copy.db");
@@ -336,7 +336,7 @@ async fn audit_verify_finds_a_changed_row_of_a_table_with_checksums() {
     for (sql, table) in [
         ("update events set payload = '{}' where seq = 1", "events"),
         ("delete from events where seq = 1", "events"),
-        ("update jobs set failures = 1", "jobs"),
+        ("update solve_jobs set failures = 1", "solve_jobs"),
         ("update sessions set by_link = 1", "sessions"),
         ("update sign_in_links set expires_at = '9999'", "sign_in_links"),
         ("update idempotency_keys set body = 'x'", "idempotency_keys"),
