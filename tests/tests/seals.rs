@@ -49,6 +49,7 @@ async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted()
         let (table, key) = (sealed.table, sealed.key[0]);
         let written = match table {
             "attempts" => "received_at",
+            "explanations" => "program",
             "safety_review_reports" => "report_id",
             _ => "created_at",
         };
@@ -124,6 +125,8 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
         }
         (_, column) if column == last && ["feedback_seq", "number"].contains(&last) => format!("{column} + 1000"),
         ("lab_session_steps", "step") => "'closed'".to_owned(),
+        // Only one explanation of a trial is complete.
+        ("explanations", "stopped_early") => "1".to_owned(),
         ("blind_pairs" | "trials" | "lab_sessions", "number") => format!("{column} + 1000"),
         (_, "hash" | "code") => "hex(randomblob(32))".to_owned(),
         ("feedback", "kind") => "'no_difference'".to_owned(),
@@ -165,7 +168,7 @@ async fn record_with_a_changed_or_deleted_row_or_schema_is_not_opened() {
         "delete from audit where seq = (select max(seq) from audit)".to_owned(),
         "update audit set actor = 'x' where seq = 1".to_owned(),
         "delete from seals where seq = (select max(seq) from seals)".to_owned(),
-        "delete from checksums where table_name = 'jobs'".to_owned(),
+        "delete from checksums where table_name = 'solve_jobs'".to_owned(),
     ];
     for sealed in seals::TABLES.iter().chain(seals::CHECKED) {
         let table = sealed.table;
