@@ -702,7 +702,7 @@ fn one_module_creates_event_streams_and_checks_the_caller() {
     let finite = ["http/src/api/study_archives.rs", "http/src/request_body.rs"];
     let (files, makers): (Vec<&str>, Vec<&str>) = makers.iter().partition(|path| finite.contains(path));
     assert_eq!(files.len(), 2);
-    assert!(found.len() > 100 && makers.len() == 1 && makers[0] == "http/src/event_stream.rs", "{makers:?}");
+    assert!(found.len() > 100 && makers.len() == 1 && makers[0] == "http/src/study_listener.rs", "{makers:?}");
 }
 
 #[tokio::test]
