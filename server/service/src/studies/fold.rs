@@ -18,7 +18,7 @@ pub(super) fn in_words(snapshot: &StudySnapshot, trial: &Trial, report: &SolveRe
     }
     if let (StartedFrom::ColdAfterWarm, Some(start)) = (report.started_from, trial.warm_started_from) {
         let start = snapshot.trial(start).map_or_else(String::new, |start| format!(" {}", start.number));
-        return Some(format!("Found by a cold start, because there is no gait near that of trial{start}."));
+        return Some(format!("Found by a cold start, because the warm start from trial{start} did not converge."));
     }
     let others = || {
         let converged = snapshot.trials.iter().filter(|other| other.state == TrialState::Converged);
