@@ -35,7 +35,7 @@ pub mod transitions;
 pub(crate) mod unchanged_bounds;
 pub mod variable_bounds;
 pub mod virtual_constraint_rows;
-pub mod zero_dynamics;
+pub mod zero_dynamics_rows;
 
 pub use evaluation::RowViolation;
 pub use gait_of_variables::gait_of;

@@ -2,12 +2,12 @@
 
 pub mod bezier;
 mod clearance_profile;
-pub mod domain;
+pub mod domain_cycle;
 pub mod impact;
 pub mod phase_variable;
 
 pub use bezier::{BEZIER_COEFFICIENTS, BEZIER_DEGREE, basis};
 pub(crate) use clearance_profile::clearance_profile;
-pub use domain::{CYCLE, ContactRow, Domain, DomainKind};
+pub use domain_cycle::{CYCLE, ContactRow, Domain, DomainKind};
 pub use impact::{Impact, impact, kinetic_energy};
 pub use phase_variable::phase_gradient;

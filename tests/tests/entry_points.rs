@@ -616,7 +616,7 @@ fn one_function_writes_the_learner_log_and_one_writes_trials() {
         }
     }
     assert_eq!(writers, ["store/src/feedback/mod.rs"], "SQL that writes the table");
-    assert_eq!(appenders, ["service/src/studies/preference.rs"], "callers of the function that writes it");
+    assert_eq!(appenders, ["service/src/studies/feedback_log.rs"], "callers of the function that writes it");
     assert_eq!(planners, ["service/src/studies/snapshot.rs"], "callers of the function that writes trials");
 }
 

@@ -6,7 +6,7 @@ use super::program_data::{GaitProgram, Structure};
 use super::sparse_entries::{Compressed, Entries};
 use super::{
     contact_limits, fibre_integration, hip_velocity, mechanics, muscle_forces, objective, stride, transitions,
-    virtual_constraint_rows, zero_dynamics,
+    virtual_constraint_rows, zero_dynamics_rows,
 };
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
@@ -85,7 +85,7 @@ impl GaitProgram {
                 muscle_forces::jacobian(self, context.layout, point_rows, &point, p, out);
             }
             let context = self.domain_context(x, d);
-            zero_dynamics::jacobian(self, &context, rows, x, out);
+            zero_dynamics_rows::jacobian(self, &context, rows, x, out);
             fibre_integration::jacobian(self, &context, rows, x, out);
             transitions::jacobian(self, d, rows, x, out);
         }
@@ -108,7 +108,7 @@ impl GaitProgram {
                 muscle_forces::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
             }
             let context = self.domain_context(x, d);
-            zero_dynamics::hessian(&context, rows, multipliers, out);
+            zero_dynamics_rows::hessian(&context, rows, multipliers, out);
             fibre_integration::hessian(&context, rows, multipliers, out);
             transitions::hessian(self, d, rows, x, multipliers, out);
         }
@@ -187,7 +187,7 @@ impl NonlinearProgram for GaitProgram {
                 muscle_forces::values(self, point_rows, &point, values);
             }
             let context = self.domain_context(x, d);
-            zero_dynamics::values(self, &context, rows, x, values);
+            zero_dynamics_rows::values(self, &context, rows, x, values);
             fibre_integration::values(self, &context, rows, x, values);
             transitions::values(self, d, rows, x, values);
         }

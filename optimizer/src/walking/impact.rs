@@ -1,6 +1,6 @@
 //! The plastic impact: velocities after a landing, and contact impulses.
 
-use super::domain::Domain;
+use super::domain_cycle::Domain;
 use crate::body::{Axis, InverseDynamics, PointState, WalkerModel};
 use nalgebra::{DMatrix, DVector};
 

@@ -9,7 +9,7 @@ use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::Caller;
-use gaitwright_service::access::sign_in::{self, SignInLookup};
+use gaitwright_service::access::session::{self, SignInLookup};
 use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, commit};
 
@@ -61,14 +61,14 @@ async fn caller(app: &AppState, path: &str, headers: &HeaderMap) -> Result<Optio
             // Automatic requests of a page do not keep a session alive.
             if let Some(session) = seen.filter(|_| !path.ends_with("/live") && !path.ends_with("/events")) {
                 let mut writer = app.write().await?;
-                sign_in::record_activity(&mut writer, session, now).await?;
+                session::record_activity(&mut writer, session, now).await?;
                 commit(writer).await?;
             }
             return Ok(Some(caller));
         }
         (SignInLookup::Ended(session), now) => {
             let mut writer = app.write().await?;
-            sign_in::record_expiry(&mut writer, session, now).await?;
+            session::record_expiry(&mut writer, session, now).await?;
             commit(writer).await?;
         }
         (SignInLookup::Nobody, _) => {}
@@ -102,8 +102,8 @@ impl Credential {
         let mut reader = app.read().await?;
         let now = app.access.clock.now(&mut reader).await?;
         let found = match self {
-            Self::Token(token) => sign_in::of_token(&mut reader, token, now).await?,
-            Self::Session(session) => sign_in::of_session(&mut reader, session, app.access.limits, now).await?,
+            Self::Token(token) => session::of_token(&mut reader, token, now).await?,
+            Self::Session(session) => session::of_session(&mut reader, session, app.access.limits, now).await?,
             Self::None => SignInLookup::Nobody,
         };
         Ok((found, now))

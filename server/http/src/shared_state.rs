@@ -7,7 +7,7 @@ use super::unwritten_access::AccessLog;
 use gaitwright_compute::{ComputeError, OnPool};
 use gaitwright_service::access::Clock;
 use gaitwright_service::access::secret::PasswordCheckQueues;
-use gaitwright_service::access::sign_in::SessionLimits;
+use gaitwright_service::access::session::SessionLimits;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::Analyses;

@@ -42,6 +42,7 @@ mod id;
 pub mod idempotency;
 pub mod imports;
 
+mod interrupted_restore;
 mod json_columns;
 pub mod lab_answers;
 pub mod lab_sessions;
@@ -57,7 +58,6 @@ pub mod read_only;
 mod record_files;
 pub mod reference_gaits;
 pub mod restore;
-mod restore_marker;
 pub mod rights;
 pub mod safety_reports;
 pub mod safety_reviews;
@@ -176,7 +176,7 @@ impl Store {
             [Some(anchor::path_of(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
         let mut owner = Ownership::take(path)?;
         let checked = async {
-            restore::finish_interrupted(path)?;
+            interrupted_restore::finish_interrupted(path)?;
             refuse_unchanged(path).await?;
             refuse_empty_in_place_of_record(path, &anchors)?;
             owner.make_database(path)

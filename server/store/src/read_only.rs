@@ -1,7 +1,7 @@
 //! Opens and checks a record without changing it.
 
 use super::record_files::path_with_suffix;
-use super::{StoreError, StoreResult, quarantine, restore_marker, schema_versions, sqlite_file};
+use super::{StoreError, StoreResult, interrupted_restore, quarantine, schema_versions, sqlite_file};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub async fn check(file: &Path) -> StoreResult<()> {
 /// [`StoreError::Open`], [`StoreError::NotADatabase`], [`StoreError::NewerSchema`],
 /// [`StoreError::DevelopmentSchema`].
 pub async fn open(file: &Path) -> StoreResult<SqlitePool> {
-    restore_marker::refuse_interrupted(file)?;
+    interrupted_restore::refuse_interrupted(file)?;
     sqlite_file::check(file)?;
     let options = SqliteConnectOptions::new().filename(file).create_if_missing(false).read_only(true);
     // Small, because a row may contain a whole measurement file.

@@ -1,33 +1,19 @@
 //! Replaces a record with a backup. The old record may be damaged or of a newer version, so it is never opened.
 //!
 //! The backup takes the name of the record in one step, but the log and the anchor of the old record must go as well. A
-//! marker beside the record notes this. If the process is killed, the next owner of the record finishes the restore if the
-//! backup has the name already, and otherwise leaves the old record with its log as it is.
+//! marker beside the record notes this, so that the next owner finishes or undoes the restore of a killed process
+//! ([`super::interrupted_restore`]).
 
-use super::atomic_file::{WholeFile, sync_folder};
+use super::atomic_file::WholeFile;
+use super::interrupted_restore::{COMPANIONS, Marker, RestoreStep, finish, finish_interrupted, hash_of, mark};
 use super::ownership::Ownership;
 use super::record_files::free_name;
 use super::record_files::path_with_suffix;
-use super::restore_marker::{self, Marker, mark, unmark};
 use super::verified_copy::{self, whole_copy};
 use super::{StoreError, StoreResult, anchor, read_only};
-use sha2::{Digest, Sha256};
 use std::fs::File;
-use std::io::{self, ErrorKind, Read};
+use std::io;
 use std::path::{Path, PathBuf};
-
-/// SQLite's companion files.
-const COMPANIONS: [&str; 2] = ["-wal", "-shm"];
-
-/// A step of a restore that is on the disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum RestoreStep {
-    OldRecordKept,
-    Marked,
-    Renamed,
-    LogRemoved,
-    Anchored,
-}
 
 /// Replaces a record with a backup, and updates the anchors to it. Returns where the old record is kept.
 ///
@@ -92,50 +78,6 @@ fn keep(to: &Path, kept: &Path) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-/// Finishes the restore of a killed process if the backup has the name of the record, and forgets it otherwise. To be
-/// called by the owner of the record, before the record is opened.
-pub(super) fn finish_interrupted(record: &Path) -> StoreResult<()> {
-    let Some(marker) = restore_marker::read(record)? else { return Ok(()) };
-    let is_renamed = match hash_of(record) {
-        Err(error) if error.kind() == ErrorKind::NotFound => false,
-        hash => hash.map_err(|source| StoreError::Open { path: record.to_owned(), source })? == marker.sha256,
-    };
-    if is_renamed {
-        finish(record, &marker, &|_| {})?;
-        tracing::warn!(record = %record.display(), "an interrupted restore was finished: the record now has the contents of the backup");
-    } else {
-        unmark(record)?;
-        tracing::warn!(record = %record.display(), "an interrupted restore was undone: the record is as it was before");
-    }
-    Ok(())
-}
-
-/// Removes the log of the old record, which must not be used with the backup, and updates the anchors.
-fn finish(record: &Path, marker: &Marker, reached: &dyn Fn(RestoreStep)) -> StoreResult<()> {
-    let others = COMPANIONS.map(|ending| path_with_suffix(record, ending));
-    for path in others.into_iter().filter(|path| path.exists()) {
-        std::fs::remove_file(&path).map_err(|source| StoreError::Open { path, source })?;
-    }
-    sync_folder(record).map_err(|source| StoreError::Open { path: record.to_owned(), source })?;
-    reached(RestoreStep::LogRemoved);
-    let own_anchor = anchor::path_of(record);
-    for anchor in std::iter::once(&own_anchor).chain(&marker.elsewhere) {
-        anchor::put(anchor, &marker.ends)?;
-    }
-    reached(RestoreStep::Anchored);
-    unmark(record)
-}
-
-fn hash_of(file: &Path) -> io::Result<String> {
-    let (mut file, mut hash, mut bytes) = (File::open(file)?, Sha256::new(), vec![0; 1 << 20]);
-    loop {
-        match file.read(&mut bytes)? {
-            0 => return Ok(hex::encode(hash.finalize())),
-            read => hash.update(bytes.get(..read).unwrap_or_default()),
-        }
-    }
 }
 
 /// Gives the backup the owner and the permissions of the old record.

@@ -5,7 +5,7 @@ use crate::accessible::{Id, Named, accessible};
 use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::{analysis, lab_session, reference_figures, study, trial};
+use crate::figures::{analysis, lab_session, maps_over_two_bounds, reference_figures, study, trial};
 use crate::openapi_binary::Binary;
 use crate::problem_details::Refusal;
 use crate::visible::Visible;
@@ -126,7 +126,7 @@ pub(super) async fn of_analysis(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(choice): Params<analysis::AxisChoice>,
+    Params(choice): Params<maps_over_two_bounds::AxisChoice>,
 ) -> Result<Response, Refusal> {
     let figures = analysis::figures(&mut app, id, choice).await?;
     response(&mut app, figures, file).await

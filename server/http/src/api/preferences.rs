@@ -14,7 +14,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_service::access::{self, Read};
-use gaitwright_service::studies::pair_answer::{self, Answer};
+use gaitwright_service::studies::preference_answer::{self, Answer};
 use gaitwright_store::feedback::{self, FeedbackContent};
 use gaitwright_store::{FeedbackId, StudyId, studies};
 use serde::{Deserialize, Serialize};
@@ -156,10 +156,10 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let given = pair_answer::give(&mut writer, &request.caller, id, &answer).await?;
+    let given = preference_answer::give(&mut writer, &request.caller, id, &answer).await?;
     let row = feedback::get(&mut writer, given).await?;
     let other_answers =
-        pair_answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
+        preference_answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
     request.created(&app, writer, location, &CreatedPreference { row: row.into(), other_answers }).await
 }
@@ -198,6 +198,7 @@ pub(super) async fn retract(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = pair_answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
+    let row =
+        preference_answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
     request.done(&app, writer, &Preference::from(row)).await
 }

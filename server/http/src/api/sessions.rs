@@ -10,7 +10,7 @@ use crate::resources::sessions::Session;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gaitwright_service::access::{AnyCaller, Right, sign_in};
+use gaitwright_service::access::{AnyCaller, Right, session};
 use gaitwright_service::error::Error;
 use gaitwright_store::{Instant, SessionId, sessions};
 use std::cmp::Reverse;
@@ -40,7 +40,7 @@ pub(super) async fn list(
         None => return Ok(Json(paging.page(Vec::new(), at)?.map(Session::from))),
         own => own,
     };
-    let live = sign_in::live(&mut reader, of, app.access.limits, now).await?;
+    let live = session::live(&mut reader, of, app.access.limits, now).await?;
     Ok(Json(paging.cut(live, at)?.map(Session::from)))
 }
 
@@ -65,10 +65,10 @@ pub(super) async fn end(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let session = sessions::get(&mut writer, id)
+    let found = sessions::get(&mut writer, id)
         .await?
         .filter(|session| request.caller.may(Right::Administer) || request.caller.user == Some(session.user_id));
-    let session = session.ok_or_else(|| Error::NotFound { what: "sign-in session".to_owned(), id: id.to_string() })?;
-    sign_in::end(&mut writer, &request.actor, &session).await?;
-    request.done(&app, writer, &Session::from(session)).await
+    let found = found.ok_or_else(|| Error::NotFound { what: "sign-in session".to_owned(), id: id.to_string() })?;
+    session::end(&mut writer, &request.actor, &found).await?;
+    request.done(&app, writer, &Session::from(found)).await
 }

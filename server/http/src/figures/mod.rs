@@ -3,6 +3,7 @@
 pub(crate) mod analysis;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
+pub(crate) mod maps_over_two_bounds;
 mod outcome;
 pub(crate) mod recording_traces;
 pub(crate) mod reference_figures;

@@ -6,7 +6,7 @@ use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::pair_answer;
+use gaitwright_service::studies::preference_answer;
 use gaitwright_store::{TrialId, gaits, reference_gaits, studies, trials};
 
 /// Every figure of the page of a gait; while its solve runs, the solver progress.
@@ -44,7 +44,7 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
 pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, a).await?;
-    let other = pair_answer::comparable(&mut reader, trial.study_id, "other", b).await?;
+    let other = preference_answer::comparable(&mut reader, trial.study_id, "other", b).await?;
     let reference = studies::get(&mut reader, trial.study_id).await?.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
     let (Some(gait_a), Some(gait_b)) = (gaits::find(&mut reader, a).await?, gaits::find(&mut reader, b).await?) else {

@@ -6,9 +6,8 @@ use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
-use crate::figures::analysis::{
-    AnalysisState, AxisChoice, DimensionChoice, MAP_NOTES, Maps, analysis_of, chosen, maps, marginals, ranked,
-};
+use crate::figures::analysis::{AnalysisState, analysis_of, marginals};
+use crate::figures::maps_over_two_bounds::{AxisChoice, DimensionChoice, MAP_NOTES, Maps, chosen, maps};
 use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
 use crate::format::{self, decimal, meaning, percent};
 use crate::page_error::{PageResult, page};
@@ -201,7 +200,7 @@ fn worse_by_utility(behind: &Prediction) -> String {
 /// The bounds with several values, the one that matters most first.
 fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
     let dimensions = analysis.posterior.space().dimensions();
-    let ranked = ranked(analysis);
+    let ranked = analysis.dimensions_by_effect();
     let largest = ranked.first().map_or(0.0, |place| analysis.main_effects[*place].difference.mean);
     let row = |place: usize| {
         let effect = &analysis.main_effects[place];

@@ -23,8 +23,8 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::MANY;
-use gaitwright_service::studies::pair_answer;
 use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
+use gaitwright_service::studies::preference_answer;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::walkable;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
@@ -303,7 +303,8 @@ async fn read_back(
                 return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
             }
             let in_words = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
-            let other_answers = pair_answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
+            let other_answers =
+                preference_answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
             answer_in_words(&row, snapshot).map(|text| SavedAnswer {
                 id: saved,
                 text,

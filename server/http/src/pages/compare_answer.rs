@@ -11,8 +11,8 @@ use gaitwright_service::access::{self, Caller};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
 use gaitwright_service::studies::assessment::{self, NewAssessment};
-use gaitwright_service::studies::pair_answer::{self, Answer, PairAnswer};
-use gaitwright_service::studies::preference::{self, CurrentAnswer};
+use gaitwright_service::studies::feedback_log::{self, CurrentAnswer};
+use gaitwright_service::studies::preference_answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::blind_pairs::OrderedAnswer;
@@ -193,7 +193,7 @@ pub(super) async fn give(
     }
     let saved = match given {
         GivenAnswer::Preference(answer) => {
-            Recorded::Preference(pair_answer::give(&mut writer, caller, id, &answer).await?)
+            Recorded::Preference(preference_answer::give(&mut writer, caller, id, &answer).await?)
         }
         GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
     };
@@ -210,7 +210,7 @@ pub(super) async fn give(
 async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<Option<Recorded>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
-    Ok(preference::current_answer(db, study, pair, author).await?.and_then(|answer| match answer {
+    Ok(feedback_log::current_answer(db, study, pair, author).await?.and_then(|answer| match answer {
         CurrentAnswer::Preference(id) => Some(Recorded::Preference(id)),
         CurrentAnswer::Assessment(id) => Some(Recorded::Assessment(id)),
         // The page shows no blinded answer, and no suggestion as an answer: the refusal says that there is one.
@@ -230,7 +230,7 @@ async fn retract_recorded(
 ) -> Result<(), Error> {
     match recorded {
         Recorded::Preference(given) => {
-            pair_answer::retract(writer, caller, Some(study), given, Some(author), reason).await?;
+            preference_answer::retract(writer, caller, Some(study), given, Some(author), reason).await?;
         }
         Recorded::Assessment(made) => {
             assessment::retract(writer, caller, Some(study), made, (Some(author), reason)).await?;

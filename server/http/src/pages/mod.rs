@@ -8,6 +8,7 @@ mod certainty;
 mod certificate;
 mod compare;
 mod compare_answer;
+mod device_form;
 mod devices;
 mod disk_space_notice;
 mod explanation;
@@ -77,7 +78,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/subjects/{id}/correct", post(subject::correct))
         .route("/subjects/{id}/muscles", get(muscle_form::get).post(muscle_form::post))
         .route("/devices", get(devices::list))
-        .route("/devices/{id}", get(devices::get).post(devices::post))
+        .route("/devices/{id}", get(device_form::get).post(device_form::post))
         .route("/trials/{id}", get(gait::get))
         .route("/trials/{id}/running", get(study::running))
         .route("/trials/{id}/certify", post(certificate::post))

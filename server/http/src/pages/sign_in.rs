@@ -13,7 +13,7 @@ use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Redirect, Response};
 use gaitwright_service::access::back_off::{self, Origin, PasswordAttempt};
-use gaitwright_service::access::{Caller, Role, password, secret, sign_in, user_administration};
+use gaitwright_service::access::{Caller, Role, password, secret, session, sign_in, user_administration};
 use gaitwright_service::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::sessions::{Session, SignInOrigin};
@@ -208,7 +208,7 @@ pub(super) async fn out(
 ) -> Result<Response, PageError> {
     if let (Some(caller), Some(session)) = (caller, session_of(&headers)) {
         let mut writer = app.write().await?;
-        sign_in::out(&mut writer, &caller.actor, session).await?;
+        session::sign_out(&mut writer, &caller.actor, session).await?;
         commit(writer).await?;
     }
     Ok(([(header::SET_COOKIE, cookie(None, app.access.secure)?)], Redirect::to("/sign-in")).into_response())
@@ -308,7 +308,7 @@ pub(super) async fn end_session(
     let (mut writer, _) = app.write_access().await?;
     let session = sessions::get(&mut writer, id).await?;
     let own = session.filter(|session| Some(session.user_id) == caller.user).ok_or_else(missing)?;
-    sign_in::end(&mut writer, &caller.actor, &own).await?;
+    session::end(&mut writer, &caller.actor, &own).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to("/account#sessions").into_response())
@@ -325,7 +325,7 @@ async fn own_sessions(
         Some(secret) => sessions::find(db, &secret::hash(secret)).await?.map(|session| session.id),
         None => None,
     };
-    let live = sign_in::live(db, Some(user), app.access.limits, now).await?;
+    let live = session::live(db, Some(user), app.access.limits, now).await?;
     Ok(live
         .into_iter()
         .map(|session| {

@@ -15,7 +15,7 @@ use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::tokens::{self as making, NewToken};
 use gaitwright_service::access::user_administration::{self, NewUser};
-use gaitwright_service::access::{Administer, Caller, Right, Role, sign_in};
+use gaitwright_service::access::{Administer, Caller, Right, Role, session};
 use gaitwright_service::error::Error;
 use gaitwright_store::sessions::Session;
 use gaitwright_store::sign_in_failures::NetworkFailures;
@@ -179,7 +179,7 @@ async fn show(app: &AppState, outcome: ActionOutcome, refused: Option<RefusedEnt
     let mut reader = app.read().await?;
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
     let now = app.access.clock.now(&mut reader).await?;
-    let sessions = sign_in::live(&mut reader, None, app.access.limits, now).await?;
+    let sessions = session::live(&mut reader, None, app.access.limits, now).await?;
     let failures = sign_in_failures::most(&mut reader, MOST_SOURCES).await?;
     page(&UsersPage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, entries })
 }
@@ -249,7 +249,7 @@ async fn apply(writer: &mut Writer, caller: &Caller, origin: &str, form: &UsersF
             let id: SessionId = form.id()?;
             let missing = || Error::NotFound { what: "sign-in session".to_owned(), id: id.to_string() };
             let session = sessions::get(writer, id).await?.ok_or_else(missing)?;
-            sign_in::end(writer, actor, &session).await?;
+            session::end(writer, actor, &session).await?;
             Ok(done(format!("Ended a session of {}.", session.user_name)))
         }
         "make_token" => {

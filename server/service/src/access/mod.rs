@@ -10,6 +10,7 @@ pub mod monotonic_clock;
 pub mod password;
 mod required_right;
 pub mod secret;
+pub mod session;
 pub mod sign_in;
 pub mod tokens;
 pub mod user_administration;

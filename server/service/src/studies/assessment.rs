@@ -1,8 +1,8 @@
 //! Records and retracts assessments: answers of staff about two gaits that state no preference (cannot tell, or
 //! unsafe).
 
-use super::pair_answer::attribution;
-use super::preference::{self, AttributedAnswer, SecondAnswer};
+use super::feedback_log::{self, AttributedAnswer, SecondAnswer};
+use super::preference_answer::attribution;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -69,9 +69,9 @@ pub async fn give(
 /// Adds an assessment and the preference derived from it, and notifies open pages.
 ///
 /// # Errors
-/// As [`preference::record`].
+/// As [`feedback_log::record`].
 pub(super) async fn write(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<AssessmentId, Error> {
-    let feedback_id = preference::record(writer, statement).await?;
+    let feedback_id = feedback_log::record(writer, statement).await?;
     let AttributedAnswer { study, pair, answer, attribution, .. } = statement;
     let id = assessments::insert(
         writer,

@@ -4,9 +4,9 @@
 //! only if the study has not changed.
 
 use super::analysis::Analyses;
+use super::feedback_log;
+use super::gait_rmse_answers::gait_rmse_answers;
 use super::lifecycle;
-use super::pending_comparison::{by_gait_rmse, partners};
-use super::preference;
 use super::safety_reports::SafetyReports;
 use super::snapshot::StudySnapshot;
 use super::trial_choice::{self, ChoiceError};
@@ -198,19 +198,12 @@ pub async fn check_result(store: &mut Store, id: TrialId, tell: &TellRequest) ->
     let (Label::Converged, Some(rmse)) = (result.label, result.gait_rmse_rad) else {
         return Ok(CheckedResult { snapshot, result, answers: Vec::new() });
     };
-    if snapshot.study.plan.answer_source == AnswerSource::People {
-        return Ok(CheckedResult { snapshot, result, answers: Vec::new() });
-    }
     let find = move |pool: &OnPool| {
-        let partners = partners(pool, &snapshot, id);
-        (snapshot, partners)
+        let answers = gait_rmse_answers(pool, &snapshot, id, rmse);
+        (snapshot, answers)
     };
-    let (snapshot, partners) = store.compute(find).await?;
-    let partners = partners.map_err(Error::Learner)?;
-    let answers = partners
-        .into_iter()
-        .filter_map(|old| snapshot.trial(old)?.gait_rmse_rad.map(|figure| by_gait_rmse((id, rmse), (old, figure))))
-        .collect();
+    let (snapshot, answers) = store.compute(find).await?;
+    let answers = answers?;
     Ok(CheckedResult { snapshot, result, answers })
 }
 
@@ -255,7 +248,7 @@ pub async fn record(
         return Ok(None);
     }
     trials::tell(writer, id, &checked.result).await?;
-    preference::compute(writer, study, (id, checked.result.label), &checked.answers, &caller.name).await?;
+    feedback_log::compute(writer, study, (id, checked.result.label), &checked.answers, &caller.name).await?;
     let payload = json!({ "trial_id": id, "number": present.number, "state": TrialState::from(checked.result.label) });
     events::append(writer, study, "trial_ended", &payload).await?;
     let detail =

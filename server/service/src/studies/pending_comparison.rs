@@ -1,4 +1,4 @@
-//! Chooses the pairs that are compared, and answers them from Gait RMSE where no person does.
+//! Chooses the pair that a person is asked to compare next.
 
 use super::same_motion::is_same_gait;
 use super::snapshot::StudySnapshot;
@@ -6,36 +6,8 @@ use super::walkable::{NotWalkable, WalkablePair};
 use gait_learner::{ActionIndex, FeedbackLog, LearnerError, proposed_comparisons_among};
 use gaitwright_compute::OnPool;
 use gaitwright_store::TrialId;
-use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::trials::Trial;
 use std::collections::HashSet;
-
-/// The earlier converged trials that a new converged trial is compared with: the best one or the latest ones, depending
-/// on the settings of the learner. `snapshot` does not have the result of the new trial yet.
-///
-/// # Errors
-/// When the learner cannot work with the log.
-pub fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Vec<TrialId>, LearnerError> {
-    let Some(new) = snapshot.trial(new) else { return Ok(Vec::new()) };
-    let plan = &snapshot.study.plan;
-    let comparable = snapshot.comparable();
-    let log = snapshot.log();
-    let proposed = proposed_comparisons_among(&plan.search_space, &log, new.action_index, &plan.learner, |a| {
-        comparable.contains(&a)
-    })?;
-    Ok(proposed.into_iter().filter_map(|c| snapshot.trial_of(c.against)).map(|trial| trial.id).collect())
-}
-
-/// The preference that Gait RMSE implies: the smaller value is better, equal values mean no difference.
-pub fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
-    if new.1 < old.1 {
-        FeedbackContent::Preference { winner: new.0, loser: old.0 }
-    } else if old.1 < new.1 {
-        FeedbackContent::Preference { winner: old.0, loser: new.0 }
-    } else {
-        FeedbackContent::NoDifference { a: new.0, b: old.0 }
-    }
-}
 
 /// The comparison that a study currently asks for.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! Records a report that one gait is unsafe. Takes effect at once: the gait, and every trial of the subject with the same
 //! motion, is neither recommended nor compared nor walked until staff have cleared the gait.
 
-use super::pair_answer::attribution;
+use super::preference_answer::attribution;
 use super::walkable::NotWalkable;
 use crate::access::Caller;
 use crate::error::Error;

@@ -1,7 +1,7 @@
 //! Records suggestions (coactive feedback): bounds with which a gait would have been better than that of a trial.
 
-use super::pair_answer::{attribution, comparable};
-use super::preference;
+use super::feedback_log;
+use super::preference_answer::{attribution, comparable};
 use crate::access::Caller;
 use crate::error::Error;
 use gait_learner::ActionIndex;
@@ -46,7 +46,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Su
     let trial = comparable(writer, study.id, "over", new.over).await?;
     let suggested = action(&study, &trial, &new.bounds)?;
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
-    let id = preference::suggest(writer, &trial, (suggested, &json!(new.bounds)), attribution).await?;
+    let id = feedback_log::suggest(writer, &trial, (suggested, &json!(new.bounds)), attribution).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": attribution.author });
     audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;

@@ -1,9 +1,9 @@
 //! Records the result of a trial exactly once: state, label, gait and the preferences that Gait RMSE implies, in one
 //! transaction.
 
+use super::feedback_log::{self, PROGRAM};
 use super::fold;
-use super::pending_comparison::{by_gait_rmse, partners};
-use super::preference::{self, PROGRAM};
+use super::gait_rmse_answers::gait_rmse_answers;
 use super::snapshot::StudySnapshot;
 use super::trial_transitions::{self, TrialEvent};
 use crate::error::Error;
@@ -11,7 +11,6 @@ use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::gaits::PackedGait;
 use gaitwright_store::solve_jobs::{FailureCounts, Lease};
-use gaitwright_store::studies::AnswerSource;
 use gaitwright_store::trials::{TrialEnd, TrialState};
 use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, solve_jobs, studies, trials};
 use serde_json::json;
@@ -75,7 +74,7 @@ pub async fn ended(
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;
         }
-        preference::compute(&mut writer, lease.study, (lease.trial, label), &answers, PROGRAM).await?;
+        feedback_log::compute(&mut writer, lease.study, (lease.trial, label), &answers, PROGRAM).await?;
         tell(&mut writer, lease, state).await?;
         commit(writer).await?;
         return Ok(true);
@@ -188,15 +187,8 @@ async fn answers(
 ) -> Result<Vec<FeedbackContent>, Error> {
     let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
     let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
-    if snapshot.study.plan.answer_source == AnswerSource::People {
-        return Ok(Vec::new());
-    }
-    let standing_there = snapshot.clone();
-    let partners = store.compute(move |pool| partners(pool, &standing_there, new)).await?.map_err(Error::Learner)?;
-    Ok(partners
-        .into_iter()
-        .filter_map(|id| snapshot.trial(id)?.gait_rmse_rad.map(|old| by_gait_rmse((new, rmse), (id, old))))
-        .collect())
+    let snapshot = snapshot.clone();
+    store.compute(move |pool| gait_rmse_answers(pool, &snapshot, new, rmse)).await?
 }
 
 async fn tell(writer: &mut Writer, lease: &Lease, state: TrialState) -> Result<(), Error> {

@@ -98,7 +98,7 @@ pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<Stri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gaitwright_service::access::sign_in::SessionLimits;
+    use gaitwright_service::access::session::SessionLimits;
 
     fn settings(flags: &Flags, environment: &[(&str, &str)]) -> Result<Settings, Error> {
         Settings::resolve(flags, |name| {

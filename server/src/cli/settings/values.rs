@@ -3,7 +3,7 @@
 use super::Settings;
 use gaitwright_http::connections::ConnectionLimits;
 use gaitwright_http::{NETWORKS, Network, Proxies, ProxyHeaders};
-use gaitwright_service::access::sign_in::SessionLimits;
+use gaitwright_service::access::session::SessionLimits;
 use gaitwright_service::error::Error;
 use gaitwright_service::scheduled_backups::BackupPlan;
 use gaitwright_store::{Store, StoreResult};

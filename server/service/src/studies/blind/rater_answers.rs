@@ -5,9 +5,9 @@ use super::next_pair::next_pair;
 use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
-use crate::studies::pair_answer as answering;
+use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::pending_comparison::pending_comparison;
-use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::preference_answer as answering;
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
@@ -153,7 +153,7 @@ async fn is_answered(
     pair: (TrialId, TrialId),
     rater: &str,
 ) -> Result<bool, Error> {
-    Ok(preference::current_answer(db, study, pair, rater).await?.is_some())
+    Ok(feedback_log::current_answer(db, study, pair, rater).await?.is_some())
 }
 
 async fn cancel(writer: &mut Writer, open: &BlindPair) -> Result<(), Error> {
@@ -209,7 +209,7 @@ pub async fn answer(
     let second_answer = if shown.kind == BlindPairKind::Repeat { SecondAnswer::Allowed } else { SecondAnswer::Refused };
     let (study, pair, fields) = (shown.study_id, shown.trials(), ("first", "second"));
     let statement = AttributedAnswer { study, pair, fields, answer, attribution, second_answer };
-    let feedback_id = preference::record(writer, statement).await.map_err(without_gaits)?;
+    let feedback_id = feedback_log::record(writer, statement).await.map_err(without_gaits)?;
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row = NewPairAnswer {
         answer,

@@ -9,8 +9,8 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use crate::studies::assessment;
-use crate::studies::pair_answer as answering;
-use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::preference_answer as answering;
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
 use gaitwright_store::audit::Actor;
@@ -204,6 +204,6 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
 }
 
 async fn record_preference(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<(), Error> {
-    let feedback_id = preference::record(writer, statement).await?;
+    let feedback_id = feedback_log::record(writer, statement).await?;
     Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": feedback_id })).await?)
 }

@@ -4,7 +4,7 @@ use super::super::archive_file::refuse;
 use super::context::{at, of_gaits};
 use crate::error::Error;
 use crate::printable;
-use crate::studies::pending_comparison::by_gait_rmse;
+use crate::studies::gait_rmse_answers::by_gait_rmse;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::studies::{AnswerSource, Study};

@@ -3,7 +3,7 @@
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::preference::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::trial_transitions::has_state;
 use crate::studies::walkable;
 use gaitwright_store::audit;
@@ -86,7 +86,7 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
         attribution,
         second_answer: SecondAnswer::Refused,
     };
-    let feedback_id = preference::record(writer, statement).await?;
+    let feedback_id = feedback_log::record(writer, statement).await?;
     let id = feedback_id.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail =
