@@ -74,7 +74,6 @@ pub use feedback::{Feedback, FeedbackLog};
 pub use interval_likelihood::Link;
 pub use learner::{Learner, posterior};
 pub use posterior::agreement::Agreement;
-pub use posterior::best_action::BestProbability;
 pub use posterior::marginals::{MainEffect, Marginal, Slice};
 pub use posterior::{Posterior, Prediction};
 pub use propose::{Proposal, ProposalReason, propose, propose_batch, propose_outside};

@@ -14,7 +14,6 @@ use crate::settings::LearnerSettings;
 use crate::special_functions;
 
 pub(crate) mod agreement;
-pub(crate) mod best_action;
 pub(crate) mod convergence_probability;
 pub(crate) mod marginals;
 pub(crate) mod preference_probability;

@@ -1,18 +1,18 @@
-//! The local optima among the attempts of a solve, and the one that is the outcome.
+//! The local optima among the runs of a solve, and the one that is the outcome.
 
-use super::attempts::{Candidate, FinishedAttempt};
 use super::local_optimum_choice::LocalOptimumChoice;
 use super::solve_report::SolveStatus;
+use super::solver_runs::{Candidate, FinishedRun};
 
 /// Largest differences of objective and Gait RMSE within a local optimum, at the tolerance of a solve.
 const SAME_OBJECTIVE: f64 = 1e-4;
 const SAME_RMSE_RAD: f64 = 5e-3;
 
-/// Numbers the local optima of the attempts. Attempts with the same objective and Gait RMSE share a local optimum.
-pub(super) fn number_local_optima(tried: &mut [FinishedAttempt]) {
+/// Numbers the local optima of the runs. Runs with the same objective and Gait RMSE share a local optimum.
+pub(super) fn number_local_optima(tried: &mut [FinishedRun]) {
     let mut known: Vec<(f64, f64)> = Vec::new();
-    for attempt in tried.iter_mut().map(|t| &mut t.attempt).filter(|a| a.status == SolveStatus::Converged) {
-        let (objective, rmse) = (attempt.objective, attempt.gait_rmse_rad);
+    for run in tried.iter_mut().map(|t| &mut t.run).filter(|a| a.status == SolveStatus::Converged) {
+        let (objective, rmse) = (run.objective, run.gait_rmse_rad);
         let same = |&(other, other_rmse): &(f64, f64)| {
             (objective - other).abs() <= SAME_OBJECTIVE * other.abs() && (rmse - other_rmse).abs() <= SAME_RMSE_RAD
         };
@@ -20,14 +20,14 @@ pub(super) fn number_local_optima(tried: &mut [FinishedAttempt]) {
             known.push((objective, rmse));
             known.len() - 1
         });
-        attempt.local_optimum = Some(number + 1);
+        run.local_optimum = Some(number + 1);
     }
 }
 
-/// Index of the outcome: a cancelled attempt, otherwise a converged one by `choice`, otherwise the one with the
+/// Index of the outcome: a cancelled run, otherwise a converged one by `choice`, otherwise the one with the
 /// smallest violation. Among the latter, stationary points of the violation come first, because they show which
 /// constraints conflict.
-pub(super) fn choose(tried: &[FinishedAttempt], choice: LocalOptimumChoice) -> usize {
+pub(super) fn choose(tried: &[FinishedRun], choice: LocalOptimumChoice) -> usize {
     if let Some(cancelled) = tried.iter().position(|t| t.candidate.status == SolveStatus::Cancelled) {
         return cancelled;
     }
@@ -39,8 +39,8 @@ pub(super) fn choose(tried: &[FinishedAttempt], choice: LocalOptimumChoice) -> u
             .map(|(index, t)| (index, t.candidate.objective))
     };
     let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
-        let gave_up = |t: &FinishedAttempt| t.candidate.status != SolveStatus::Infeasible;
-        let violation = |t: &FinishedAttempt| t.candidate.violation;
+        let gave_up = |t: &FinishedRun| t.candidate.status != SolveStatus::Infeasible;
+        let violation = |t: &FinishedRun| t.candidate.violation;
         return tried
             .iter()
             .enumerate()

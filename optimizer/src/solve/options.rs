@@ -16,7 +16,7 @@ pub struct SolveOptions {
     /// Largest number of iterations of each phase; tracking phases have at most 200.
     pub max_iterations: usize,
     /// Largest wall time of the whole solve, s; `None` for no limit. With a limit, equal inputs need not give equal bits:
-    /// the machine's speed decides which attempts and iterations come before it.
+    /// the machine's speed decides which runs and iterations come before it.
     pub time_limit_s: Option<f64>,
     /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result
     /// does not depend on it.
@@ -25,7 +25,7 @@ pub struct SolveOptions {
     pub initial_guesses: usize,
     /// Whether further guesses follow until one converges.
     pub retry: bool,
-    /// The choice among converged attempts.
+    /// The choice among converged runs.
     pub local_optimum_choice: LocalOptimumChoice,
     /// Largest number of rounds in which bounds are tightened if the gait violates them between nodes by more than
     /// half of the limit of the certificate. 0 disables the check.
