@@ -10,6 +10,7 @@
 //! | C8 fibre kinematics | [`fibre_integration`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
 
+mod contact_force_bounds;
 pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;

@@ -20,8 +20,8 @@ use gait_optimizer::{
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::problem_file::SolveInput;
 use gaitwright_service::studies::sensitivities::refusal;
-use gaitwright_service::studies::solve_input::SolveInput;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

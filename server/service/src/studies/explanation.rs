@@ -1,6 +1,6 @@
 //! The infeasibility explanation of one trial: its state, requests for it, and its storage.
 
-use super::solve_input::{PackedInput, SolveInput};
+use super::problem_file::{PackedInput, SolveInput};
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use crate::workers::SolveToExplain;

@@ -4,6 +4,7 @@
 //! [`Scheduler`](scheduler::Scheduler) applies them: it proposes trials, dispatches solves and records results. All its
 //! state is in the record, so a new process continues where a killed one stopped.
 
+pub mod actions_with_known_gait;
 pub mod analysis;
 pub mod archive;
 pub mod assessment;
@@ -18,7 +19,6 @@ mod certifier;
 pub mod command;
 pub mod consent;
 pub mod device;
-pub mod equal_actions;
 pub mod execution;
 pub mod execution_request;
 mod explainer;
@@ -39,8 +39,10 @@ mod next_step;
 pub mod pending_comparison;
 mod planning_tasks;
 pub mod preference_answer;
+pub mod problem_file;
 pub mod pruning;
 pub mod ranking;
+pub mod recommended_trial;
 pub mod reference_import;
 pub mod reference_preview;
 pub mod relaxed_trial;
@@ -54,7 +56,6 @@ pub mod scheduler;
 pub mod seed;
 pub mod sensitivities;
 pub mod snapshot;
-pub mod solve_input;
 pub mod study_change;
 pub mod study_plan;
 pub mod study_plan_schemas;
@@ -69,3 +70,4 @@ pub mod trial_transitions;
 pub mod utility_history;
 mod walk_simulator;
 pub mod walkable;
+pub mod warm_start_choice;

@@ -5,6 +5,7 @@ use super::lifecycle::StudyTransition;
 use super::pending_comparison::{self, PendingComparison};
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
+use super::warm_start_choice;
 use crate::error::Error;
 use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
@@ -68,7 +69,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
         });
     }
     let is_full = open >= study.plan.parallel_trials as usize;
-    if is_full || study.plan.evaluation == Evaluation::Script || trial_choice::awaits_root(snapshot) {
+    if is_full || study.plan.evaluation == Evaluation::Script || warm_start_choice::awaits_root(snapshot) {
         return Ok(PlanningStep::Nothing);
     }
     let posterior = analyses.posterior(pool, snapshot).map_err(Error::Learner)?;

@@ -6,9 +6,10 @@
 use super::analysis::Analyses;
 use super::bound_grid;
 use super::lifecycle::{self, StudyTransition};
+use super::recommended_trial::best_trial;
 use super::snapshot::StudySnapshot;
 use super::study_change;
-use super::trial_choice::{best_trial, warm_start_of_next};
+use super::warm_start_choice::warm_start_of_next;
 use crate::error::Error;
 use gait_learner::{ActionIndex, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;

@@ -1,6 +1,6 @@
 //! The sensitivities of one trial's gait, computed from its stored solution.
 
-use super::solve_input::PackedInput;
+use super::problem_file::PackedInput;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_learner::SearchSpace;

@@ -9,7 +9,7 @@ pub use gait_map::{AtlasRow, GaitMap};
 pub use solved_action::{GaitValues, SolvedAction};
 
 use super::bound_grid;
-use super::solve_input::SolveInput;
+use super::problem_file::SolveInput;
 use crate::error::Error;
 use gait_learner::ActionIndex;
 use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveStatus, TunedBounds, WarmStart, solve};

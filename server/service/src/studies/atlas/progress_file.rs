@@ -2,7 +2,7 @@
 
 use super::solved_action::SolvedAction;
 use crate::error::Error;
-use crate::studies::solve_input::SolveInput;
+use crate::studies::problem_file::SolveInput;
 use gait_learner::ActionIndex;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
