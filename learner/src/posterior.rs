@@ -15,6 +15,7 @@ use crate::special_functions;
 
 pub(crate) mod agreement;
 pub(crate) mod convergence_probability;
+pub(crate) mod main_effects;
 pub(crate) mod marginals;
 pub(crate) mod preference_probability;
 #[cfg(test)]

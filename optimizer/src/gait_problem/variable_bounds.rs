@@ -2,6 +2,7 @@
 //! [`super::contact_force_bounds`] has those of contact forces.
 
 use super::contact_force_bounds::contact_force_bounds;
+use super::joint_ranges::joint_ranges;
 use super::layout::{FORCE, Layout, Q, QD, QDD, U};
 use super::rows::RowTable;
 use crate::device::Device;
@@ -67,21 +68,7 @@ pub fn variable_bounds(
         lower[index] = low / layout.scale[index];
         upper[index] = high / layout.scale[index];
     };
-    let torso = bounds.a6.max(limits.torso_tolerance_rad);
-    let hip = bounds.a7.to_radians().min(limits.hip_max_rad);
-    let ankle = bounds.a8.to_radians();
-    let knee = (limits.knee_min_rad, limits.knee_max_rad);
-    let position = [
-        (-10.0, 10.0),
-        (-10.0, 10.0),
-        (-torso, torso),
-        (-hip, hip),
-        knee,
-        (-ankle, ankle),
-        (-hip, hip),
-        knee,
-        (device.ankle_min_rad.max(-ankle), device.ankle_max_rad.min(ankle)),
-    ];
+    let position = joint_ranges(bounds, limits, device);
     let device_speed = bounds.a1.min(device.joint_speed_limit_rad_s);
     let torque = limits.joint_torques_n_m(device);
     for (d, domain) in layout.domains.iter().enumerate() {

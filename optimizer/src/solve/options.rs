@@ -1,7 +1,6 @@
 //! Options of a solve.
 
 use super::cold_start_guesses::InitialGuess;
-use super::local_optimum_choice::LocalOptimumChoice;
 use super::solver_settings;
 use crate::model_error::ModelError;
 use interior_point::NlpSettings;
@@ -69,5 +68,34 @@ impl SolveOptions {
             ModelError::check_range("time_limit_s", limit, 0.0, 1e7)?;
         }
         Ok(())
+    }
+}
+
+/// The choice among several converged gaits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalOptimumChoice {
+    /// The gait with the lowest objective.
+    #[default]
+    LowestObjective,
+    /// The gait with the lowest Gait RMSE among those with an objective near the lowest.
+    NearestToReference {
+        /// Largest excess over the lowest objective, per cent.
+        within_percent: f64,
+    },
+}
+
+impl LocalOptimumChoice {
+    /// Checks the percentage.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] with the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        match self {
+            Self::LowestObjective => Ok(()),
+            Self::NearestToReference { within_percent } => {
+                ModelError::check_range("local_optimum_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
+            }
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::output::{data, tell};
 use super::problem_flags::ProblemFiles;
 use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{SubjectFlags, Switch};
-use super::unattended::{self, Lines, action_line};
+use super::unattended_study::{self, Lines, action_line};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
@@ -84,9 +84,9 @@ impl TuneCommand {
             warm_start_from: self.warm_start_from,
             ..NewStudy::of(subject.id)
         };
-        let study = Box::pin(unattended::study(&store, new)).await?;
+        let study = Box::pin(unattended_study::study(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
-        let ran = Box::pin(unattended::run_and_certify(&mut store, &study, workers, lines)).await;
+        let ran = Box::pin(unattended_study::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;
         let (ran, certification) = ran?;
         let (snapshot, analyses) = (ran.snapshot.clone(), Arc::clone(&ran.analyses));
@@ -104,7 +104,7 @@ impl TuneCommand {
             ));
             return Ok(CommandEnd::Interrupted);
         }
-        match unattended::failure(&ran.snapshot) {
+        match unattended_study::failure(&ran.snapshot) {
             None => Ok(CommandEnd::Done),
             Some(failure) => {
                 tell(&format!("gaitwright: {failure}"));

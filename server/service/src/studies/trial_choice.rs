@@ -2,6 +2,7 @@
 
 use super::actions_with_known_gait::actions_with_known_gait;
 use super::bound_grid;
+use super::excluded_actions::excluded_without_result;
 use super::seed::{Purpose, derive};
 use super::snapshot::StudySnapshot;
 use super::warm_start_choice::warm_start_of_next;
@@ -42,12 +43,12 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, posterior: &Posterior) -
     }
     let log = snapshot.log();
     let seed = derive(plan.seed, Purpose::Proposal, u64::from(number));
-    let barred = snapshot.barred_without_result();
+    let excluded = excluded_without_result(snapshot);
     let proposal = if plan.excludes_known_gaits() {
         let known = actions_with_known_gait(snapshot)?;
-        propose_outside(&plan.search_space, &log, &barred, &known, &plan.learner, seed)?
+        propose_outside(&plan.search_space, &log, &excluded, &known, &plan.learner, seed)?
     } else {
-        propose(&plan.search_space, &log, &barred, &plan.learner, seed)?
+        propose(&plan.search_space, &log, &excluded, &plan.learner, seed)?
     };
     Ok(NewTrial {
         number,

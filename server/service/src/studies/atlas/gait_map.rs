@@ -147,7 +147,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::solved_action::GaitValues;
+    use super::super::gait_values::GaitValues;
     use super::*;
     use gait_optimizer::{SolveStatus, UnchangedBound};
 

@@ -1,8 +1,8 @@
 //! Unblinding of a lab session.
 
+use super::controller_file_download::not_included;
 use super::lab_answer;
 use super::session::still_shown;
-use super::walk_controller_file::not_included;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
