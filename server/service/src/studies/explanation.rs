@@ -175,7 +175,9 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
         )));
     };
     if !gaits::exists(db, trial.id).await? {
-        return Err(Error::conflict(format!("The last motion tried in trial {number} was not kept.")));
+        return Err(Error::conflict(format!(
+            "The last motion tried in trial {number} is no longer stored, so the trial cannot be explained."
+        )));
     }
     Ok(status)
 }

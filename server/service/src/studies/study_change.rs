@@ -52,7 +52,12 @@ const LONGEST_NOTES: usize = 4000;
 /// [`Error::Invalid`] naming the field.
 pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
     if tags.len() > MOST_TAGS {
-        return Err(FieldError::described("tags", &format!("a list of {}", tags.len()), "a list of at most 10").into());
+        return Err(FieldError::described(
+            "tags",
+            &format!("a list of {} tags", tags.len()),
+            "a list of at most 10 tags",
+        )
+        .into());
     }
     let mut checked = Vec::new();
     for tag in tags {

@@ -137,6 +137,7 @@ impl ReproduceCommand {
                         }
                         if ran.snapshot.study.state != StudyState::Finished {
                             let why = unattended_study::failure(&ran.snapshot).unwrap_or_default();
+                            let why = why.trim_end_matches('.');
                             return Err(Error::Internal(format!("{title}: {why}. The comparison was stopped.")));
                         }
                         (ran.snapshot, ran.analyses)
