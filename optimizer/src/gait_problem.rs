@@ -2,7 +2,7 @@
 //!
 //! | constraint | rows here |
 //! |---|---|
-//! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics_rows`] |
+//! | C1 dynamics and contact | [`motion_and_contact_rows`], Hermite-Simpson of the zero dynamics in [`zero_dynamics_rows`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity_rows`], [`transitions`] |
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`joint_ranges`], [`stride`] |
@@ -24,8 +24,8 @@ pub mod inter_node_check;
 mod joint_ranges;
 pub mod layout;
 pub mod margins;
-pub mod mechanics;
 pub mod mesh_transfer;
+pub mod motion_and_contact_rows;
 pub mod muscle_forces;
 pub mod objective;
 mod problem_definition;

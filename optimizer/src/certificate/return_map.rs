@@ -128,7 +128,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
     let (_, derivative) = walker.stride_with_derivative(&fixed)?;
     let derivative = section_matrix(&derivative);
     let no_eigenvalues = || Fall::NotIntegrable {
-        domain: "stride",
+        domain: "the stride",
         reason: "the eigenvalues of the stride-to-stride map did not converge".to_owned(),
     };
     let possible = possible_directions(&walker.controls[0], &fixed);

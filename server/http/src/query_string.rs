@@ -46,6 +46,7 @@ fn unreadable(path: &str, message: &str, pairs: &Pairs, others: &[&str]) -> Erro
         (Some(_), _) => "present".to_owned(),
         (_, Some(_)) => "present only once".to_owned(),
         _ if unknown && message.ends_with("there are no fields") => String::new(),
+        _ if message.starts_with("invalid value: integer") => json_document::expected(message),
         // The value comes before it, and may hold any words.
         _ if unknown || of_type => {
             json_document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]))
@@ -92,7 +93,10 @@ impl<'de> IntoDeserializer<'de, Refused> for Text<'de> {
 
 impl<'de> Text<'de> {
     fn parsed<T: FromStr, V: Visitor<'de>>(self, visitor: &V) -> Result<T, Refused> {
-        self.0.parse().map_err(|_| Refused::invalid_type(Unexpected::Str(self.0), visitor))
+        self.0.parse().map_err(|_| match self.0.parse() {
+            Ok(number) => Refused::invalid_value(Unexpected::Unsigned(number), visitor),
+            Err(_) => Refused::invalid_type(Unexpected::Str(self.0), visitor),
+        })
     }
 
     fn plain(self) -> StrDeserializer<'de, Refused> {

@@ -75,7 +75,10 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
         (_, Some(_)) => format!("The field {field} occurs twice{place}."),
         _ if is_sentence => format!("The field {field} is invalid{place}: {message}."),
         _ if message.starts_with("unknown field") => {
-            format!("The field {field} is unknown{place}. Known fields: {}.", allowed.trim_start_matches("one of "))
+            format!(
+                "The field {field} is unknown{place}. Known fields: {}.",
+                allowed.trim_start_matches("one of ").replace(" or ", ", ")
+            )
         }
         _ => format!("The field {field} is {}{place}; it must be {allowed}.", shortened(&value)),
     };
@@ -169,8 +172,9 @@ pub fn expected(message: &str) -> String {
         "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
         "f32" | "f64" => "a number".to_owned(),
         "a boolean" => "true or false".to_owned(),
-        "a string" => "a string".to_owned(),
         "a sequence" => "a list".to_owned(),
+        "a map" => "an object".to_owned(),
+        "a string" | "string or map" => "a string".to_owned(),
         other if other.starts_with("struct ") => OBJECT.to_owned(),
         other => other.replace('`', ""),
     }

@@ -3,12 +3,13 @@
 use super::command_end::CommandEnd;
 use super::cores::cores_or;
 use super::flag_numbers::local_optimum;
+use super::input_file::read_document;
 use super::interruption::cancelled_by_signal;
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::{ProblemFlags, read_document};
+use super::problem_flags::ProblemFlags;
 use super::reference_comparison;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};

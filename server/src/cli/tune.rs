@@ -6,7 +6,7 @@ use super::flag_choices::{WARM_STARTS, one_of};
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
-use super::problem_flags::ProblemFiles;
+use super::problem_files::ProblemFiles;
 use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{SubjectFlags, Switch};
 use super::unattended_study::{self, Lines, action_line};

@@ -272,6 +272,9 @@ impl StoreError {
         match self {
             Self::Damaged { what, reason } => format!("{what}: {reason}"),
             Self::UnknownValue { what, text } => format!("{what}: unknown value {text:?}"),
+            Self::Unsealed { table, key } => {
+                format!("row {key} of {table} has no seal, so this program did not write it")
+            }
             Self::Database(error) => format!("the database refused it: {error}"),
             other => other.to_string().trim_end_matches('.').to_owned(),
         }

@@ -89,7 +89,7 @@ pub(super) async fn get(
         let mut reader = app.read().await?;
         let id = id.accessible(&mut reader, authorized.caller.reach()).await?;
         if compared.iter().any(|study| study.id == id) {
-            return Err(Error::invalid("ids", paging.filter.ids.as_str(), "identifiers of different studies").into());
+            return Err(Error::invalid("ids", paging.filter.ids.as_str(), "a list of different studies").into());
         }
         consents::may_be_shown(&mut reader, id).await?;
         compared.push(studies::get(&mut reader, id).await?);

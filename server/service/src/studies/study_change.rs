@@ -63,7 +63,7 @@ pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
     for tag in tags {
         let tag = printable::name("tags", tag, LONGEST_TAG)?;
         if tag.contains(',') {
-            return Err(Error::invalid("tags", tag, "without commas, which separate tags"));
+            return Err(Error::invalid("tags", tag, "a tag without commas, because commas separate tags"));
         }
         checked.push(tag.to_owned());
     }

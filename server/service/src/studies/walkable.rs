@@ -141,7 +141,10 @@ pub enum NotWalkable {
         number: u32,
     },
     /// The trajectory was pruned before it was certified.
-    #[error("The trajectory of trial {number} was deleted before its gait was certified.")]
+    #[error(
+        "The trajectory of trial {number} was deleted before its gait was certified, so the gait cannot be used for \
+         walking or compared."
+    )]
     Pruned {
         /// Number of the trial.
         number: u32,

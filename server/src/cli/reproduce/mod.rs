@@ -8,7 +8,7 @@ use super::command_end::CommandEnd;
 use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::reference_of;
+use super::problem_files::reference_of;
 use super::unattended_study::{self, Lines};
 use clap::{Args, ValueEnum};
 use gait_optimizer::{ReferenceGait, Subject};

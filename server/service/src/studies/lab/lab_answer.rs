@@ -59,7 +59,7 @@ pub async fn give(
     let session = still_shown(writer, id).await?;
     let number = next_number(&session);
     if !(1..=number).contains(&new.number) {
-        return Err(Error::invalid("number", new.number, &format!("1 to {number}")));
+        return Err(Error::invalid("number", new.number, &format!("{number}, the number of the next answer")));
     }
     if new.answer.is_about_safety() {
         return report_unsafe(writer, caller, &session, new).await;

@@ -76,7 +76,7 @@ pub(super) async fn gait(
     trial: &Trial,
     context: &Arc<Context>,
 ) -> Result<bool, String> {
-    let text = |error: StoreError| error.to_string();
+    let text = |error: StoreError| error.finding();
     if !gaits::exists(db, trial.id).await.map_err(text)? {
         return Ok(false);
     }
@@ -142,7 +142,7 @@ fn same_values(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<
 
 /// Checks the results that workers delivered for a trial.
 pub(super) async fn check_results(db: &mut Connection, trial: &Trial) -> Result<(), String> {
-    let results = attempts::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
+    let results = attempts::of_trial(db, trial.id).await.map_err(|e| e.finding())?;
     let mut used = results.iter().filter(|result| result.used);
     let Some(result) = used.next() else { return Ok(()) };
     if used.next().is_some() {
