@@ -393,6 +393,35 @@ async fn pages_are_served_without_external_resources() {
 }
 
 #[tokio::test]
+async fn text_is_compressed_unless_it_has_a_strong_entity_tag_or_is_a_stream() {
+    let (_folder, service) = service().await;
+    let study = finished(&service, 2).await;
+    let compressed = async |path: &str| {
+        let request = Request::get(path).header("accept-encoding", "gzip").body(Body::empty()).unwrap();
+        let answer = service.send(request).await;
+        assert_eq!(answer.status, StatusCode::OK, "{path}");
+        answer.headers.get("content-encoding").is_some_and(|encoding| encoding == "gzip")
+    };
+    for path in
+        ["/static/gaitwright.css".to_owned(), format!("/studies/{study}"), format!("/api/v1/studies/{study}/trials")]
+    {
+        assert!(compressed(&path).await, "{path}");
+        assert!(!service.fetch(&path).await.headers.contains_key("content-encoding"), "{path}: nobody asked for gzip");
+    }
+    for path in [format!("/api/v1/studies/{study}"), format!("/api/v1/studies/{study}/archive"), "/health".to_owned()] {
+        assert!(!compressed(&path).await, "{path}");
+    }
+    let events = Request::get(format!("/api/v1/studies/{study}/events")).header("accept-encoding", "gzip");
+    let events = service.router().oneshot(events.body(Body::empty()).unwrap()).await.unwrap();
+    assert_eq!(events.headers()["content-type"], "text/event-stream");
+    assert!(!events.headers().contains_key("content-encoding"), "events must not wait in a buffer");
+    let tag = service.fetch("/static/live.mjs").await.headers["etag"].to_str().unwrap().to_owned();
+    let known = Request::get("/static/live.mjs").header("if-none-match", &tag).body(Body::empty()).unwrap();
+    assert_eq!(service.send(known).await.status, StatusCode::NOT_MODIFIED);
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn refused_study_form_is_shown_again_with_its_errors() {
     let (_folder, service) = service().await;
     let form = |height: &str, trials: &str| {

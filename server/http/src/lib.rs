@@ -13,6 +13,7 @@ mod blind_motion;
 mod body_limits;
 mod body_measures;
 mod client_address;
+mod compression;
 pub mod connections;
 mod csv_response;
 mod entity_tag;

@@ -1,8 +1,8 @@
 //! The router: all routes, and the layers around them.
 
 use super::{
-    AppState, access_log_layer, api, authentication, client_address, host_header, metrics, openapi, page_error, pages,
-    responses, same_origin, saved_as, static_files,
+    AppState, access_log_layer, api, authentication, client_address, compression, host_header, metrics, openapi,
+    page_error, pages, responses, same_origin, saved_as, static_files,
 };
 use crate::problem_details::Refusal;
 use axum::Router;
@@ -44,6 +44,7 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
     };
     routes
+        .layer(compression::layer())
         .layer(middleware::from_fn(saved_as::name))
         .layer(middleware::from_fn(access_log_layer::add_caller))
         .layer(middleware::from_fn_with_state(state.clone(), authentication::identify))

@@ -14,7 +14,8 @@ struct StaticFiles;
 /// `GET /static/{path}`. Browsers revalidate by content hash, so a new version is used at once.
 pub(super) async fn get(Path(path): Path<String>, headers: HeaderMap) -> Result<Response, Refusal> {
     let file = StaticFiles::get(&path).ok_or_else(|| Error::NotFound { what: "file".to_owned(), id: path })?;
-    let tag = format!("\"{}\"", hex::encode(&file.metadata.sha256_hash()[..16]));
+    // Weak, because a compressed response has other bytes.
+    let tag = format!("W/\"{}\"", hex::encode(&file.metadata.sha256_hash()[..16]));
     let known = headers.get(header::IF_NONE_MATCH).is_some_and(|value| value.as_bytes() == tag.as_bytes());
     if known {
         return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
