@@ -200,9 +200,17 @@ impl Explanation {
         let conflict = self.conflicts.first()?;
         let limits: Vec<String> = conflict.bounds.iter().map(BoundValue::limit_in_words).collect();
         Some(match limits.as_slice() {
-            [] => "No values of the bounds give a gait: fixed constraints conflict.".to_owned(),
-            [one] if conflict.undecided => format!("With {one}, there is probably no gait, whatever the other bounds."),
-            [one] => format!("With {one}, there is no gait, whatever the other bounds."),
+            [] => {
+                "No gait was found even with every bound at its loosest value: fixed constraints conflict.".to_owned()
+            }
+            [one] if conflict.undecided => {
+                format!(
+                    "With {one}, no gait was found even with the other bounds at their loosest values, but one may exist."
+                )
+            }
+            [one] => {
+                format!("With {one}, no gait was found even with the other bounds at their loosest values.")
+            }
             _ if conflict.undecided => format!("These bounds probably conflict: {}.", list(&limits)),
             _ => format!("These bounds conflict: {}.", list(&limits)),
         })

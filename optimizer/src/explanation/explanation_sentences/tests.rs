@@ -86,9 +86,9 @@ fn headline_names_limits_with_their_direction() {
     );
     assert_eq!(
         of(&[(2, 1.5)]),
-        "With a hip velocity of at least 1.5 m/s, there is no gait, whatever the other bounds."
+        "With a hip velocity of at least 1.5 m/s, no gait was found even with the other bounds at their loosest values."
     );
-    assert_eq!(of(&[]), "No values of the bounds give a gait: fixed constraints conflict.");
+    assert_eq!(of(&[]), "No gait was found even with every bound at its loosest value: fixed constraints conflict.");
 }
 
 #[test]
