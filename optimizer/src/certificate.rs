@@ -18,10 +18,10 @@
 mod check;
 mod closed_loop;
 mod contact_kinematics;
-mod domain_differences;
 mod dormand_prince;
 mod feedback_linearization;
 mod findings;
+mod finite_differences;
 mod guard;
 mod hybrid_walker;
 mod identity;

@@ -15,7 +15,7 @@ mod model_activity;
 mod raw_signal_checks;
 
 pub use activity::Activity;
-pub use cycle_activity::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};
+pub use cycle_activity::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse};
 pub use emg_recording::EmgRecording;
 pub use envelope::Envelope;
 pub use filter_settings::EmgSettings;

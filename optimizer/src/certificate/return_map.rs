@@ -3,8 +3,8 @@
 //! The section is the state after right heel strike without px, on which nothing depends: 17 numbers. Directions that
 //! violate the contacts have multiplier 0 and are omitted.
 
-use super::domain_differences::{ByDifferences, by_differences, possible_directions};
 use super::feedback_linearization::{State, StateMatrix, split};
+use super::finite_differences::{ByDifferences, by_differences, possible_directions};
 use super::hybrid_walker::{Fall, HybridWalker};
 use super::poincare_section::{SECTION, Section, section, with_section};
 use nalgebra::linalg::Schur;

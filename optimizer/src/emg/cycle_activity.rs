@@ -2,7 +2,7 @@
 
 use super::envelope::Envelope;
 use crate::model_error::ModelError;
-use crate::reference::STRIDE_RANGE_S;
+use crate::reference::{STRIDE_RANGE_S, is_plausible, strides_between};
 use serde::{Deserialize, Serialize};
 
 /// Number of points of a gait cycle: 0, 1, ..., 100 %.
@@ -19,16 +19,6 @@ pub struct CycleActivity {
     pub standard_deviation: Vec<f64>,
     /// Number of strides.
     pub strides: usize,
-}
-
-/// The strides between successive heel strikes, s.
-pub fn strides_between(heel_strikes_s: &[f64]) -> Vec<(f64, f64)> {
-    heel_strikes_s.windows(2).map(|pair| (pair[0], pair[1])).collect()
-}
-
-/// Whether a stride, s, lasts as long as strides do.
-pub fn is_plausible((start, end): (f64, f64)) -> bool {
-    (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start))
 }
 
 impl CycleActivity {

@@ -51,7 +51,10 @@ fn unreadable(path: &str, message: &str, pairs: &Pairs, others: &[&str]) -> Erro
             json_document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]))
         }
         _ if message.starts_with("UUID parsing failed") => "an identifier".to_owned(),
-        _ => message.to_owned(),
+        // The words of a reader of its own can be a whole refusal.
+        _ => {
+            message.rsplit_once("it must be ").map_or(message, |(_, allowed)| allowed).trim_end_matches('.').to_owned()
+        }
     };
     let message = match (missing, twice) {
         (Some(_), _) => format!("The query parameter {field} is missing."),

@@ -63,6 +63,7 @@ pub mod safety_reports;
 pub mod safety_reviews;
 mod schema_versions;
 pub mod seals;
+mod second_writer;
 pub mod sessions;
 pub mod sign_in_failures;
 pub mod solve_jobs;
@@ -216,7 +217,7 @@ impl Store {
             only.close().await;
             return Err(refused);
         }
-        let version = writer::data_version(&mut *only.acquire().await?).await?;
+        let version = second_writer::data_version(&mut *only.acquire().await?).await?;
         migrations::apply(&only, path).await?;
         if let Some(newest) = audit::newest(&mut *only.acquire().await?).await? {
             time::never_before(newest);

@@ -7,7 +7,7 @@ use crate::authorization::Authorized;
 use crate::idempotent::{Idempotent, IdempotentWith};
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
-use crate::resources::documents;
+use crate::resources::document_schemas;
 use crate::resources::emg::EmgView;
 use crate::resources::limit_cycles::LimitCycles;
 use crate::resources::measurement_files::MeasurementFile;
@@ -165,7 +165,7 @@ async fn keep(
 #[serde(deny_unknown_fields, default)]
 pub(super) struct EmgProcessing {
     /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
-    #[schema(value_type = documents::EmgSettings)]
+    #[schema(value_type = document_schemas::EmgSettings)]
     settings: EmgSettings,
 }
 

@@ -3,8 +3,8 @@
 //! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, lab session,
 //! comparison and recommendation takes one, so code that skips the rules does not compile.
 
+use super::identical_gaits::is_same_gait;
 use super::safety_reports::SafetyReports;
-use super::same_motion::is_same_gait;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;

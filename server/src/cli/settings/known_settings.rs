@@ -27,6 +27,6 @@ pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("connections_per_address", "100", "maximum number of connections from one address; trusted proxies are exempt"),
     ("access_log_days", "0", "days for which rows of the access log are kept; 0: forever"),
     ("reserve_mb", "500", "free disk space, MB, below which no new study or solve starts"),
-    ("log", "warn,gaitwright=info", "log filter, as in RUST_LOG"),
+    ("log", "warn,sqlx::query=error,gaitwright=info", "log filter, as in RUST_LOG"),
     ("log_format", "text", "log format: text or json"),
 ];

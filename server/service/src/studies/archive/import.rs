@@ -60,7 +60,7 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
         let space = if id.is_empty() { "" } else { " " };
         let named = format!("row {number} (table {table}{space}{id:.36})");
         if let Err(error) = quarantine.add(table, row).await {
-            refused = Some(refuse(format!("{named}: {error}")));
+            refused = Some(refuse(format!("{named}: {}", error.finding())));
             break;
         }
     }

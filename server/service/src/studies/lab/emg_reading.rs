@@ -2,7 +2,8 @@
 
 use super::file_format::{MeasurementFormat, WHAT, check_file_name};
 use crate::error::{Error, FieldError};
-use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope, strides_between};
+use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
+use gait_optimizer::reference::strides_between;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;

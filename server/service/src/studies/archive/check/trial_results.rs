@@ -37,7 +37,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     }
     if trial.script.is_some() || !trial.state.is_result() {
         let none = trial.report.is_none() && trial.status.is_none();
-        return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
+        return if none { Ok(()) } else { Err("it has a solve report or a status, but no solve".to_owned()) };
     }
     let state = trial.status.and_then(trial_transitions::label_of).map(TrialState::from);
     if state != Some(trial.state) {
