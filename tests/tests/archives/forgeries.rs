@@ -275,7 +275,7 @@ pub(super) const FORGERIES: [Forgery; 74] = [
             let place = r.0.iter().position(|(_, row)| row["kind"] == "label").unwrap();
             r.0.remove(place);
         },
-        "7 have a label",
+        "the number of labels is 7",
     ),
     (
         "a preference of Gait RMSE turned",
