@@ -454,6 +454,10 @@ create table feedback (
                check (source in ('evaluation', 'gait_rmse', 'subject', 'clinician', 'script')),
     author     text not null constraint feedback_author_length check (length(author) between 1 and 80),
     note       text not null default '' constraint feedback_note_length check (length(note) <= 2000),
+    -- The preference or assessment in whose place this answer was given. It refers to one of two tables.
+    replaces   text,
+    -- The preference that counts again, because the change to another answer was undone.
+    restores   text references feedback (id),
     created_at text not null,
     constraint feedback_shape check (
         case kind
@@ -462,7 +466,12 @@ create table feedback (
             else trial_b is not null and label is null and suggested is null
         end
     ),
-    constraint feedback_two_trials check (trial_b is null or trial_a <> trial_b)
+    constraint feedback_two_trials check (trial_b is null or trial_a <> trial_b),
+    constraint feedback_change check (
+        (replaces is null and restores is null)
+        or ((replaces is null or restores is null) and kind in ('preference', 'no_difference')
+            and source in ('subject', 'clinician', 'script'))
+    )
 ) strict;
 
 create index feedback_by_study on feedback (study_id, seq);
@@ -473,6 +482,9 @@ create index feedback_suggestions on feedback (study_id, suggested) where kind =
 -- A trial has one label and Gait RMSE compares a pair once, however often a result is delivered.
 create unique index feedback_one_label on feedback (trial_a) where kind = 'label';
 create unique index feedback_one_rmse_pair on feedback (trial_a, trial_b) where source = 'gait_rmse';
+-- An answer is changed once, and brought back once: afterwards another row is in force.
+create unique index feedback_one_replacement on feedback (replaces) where replaces is not null;
+create unique index feedback_one_restoration on feedback (restores) where restores is not null;
 
 create trigger feedback_no_update before update on feedback
 begin select raise(abort, 'feedback is append-only'); end;
@@ -512,11 +524,20 @@ create table assessments (
     note        text not null default '' constraint assessments_note_length check (length(note) <= 2000),
     -- The preference that the learner received; null if none.
     feedback_id text references feedback (id),
+    -- As in feedback.
+    replaces    text,
+    restores    text references assessments (id),
     created_at  text not null,
-    constraint assessments_two_gaits check (trial_a <> trial_b)
+    constraint assessments_two_gaits check (trial_a <> trial_b),
+    -- Only answers that state nothing about safety are brought back: a safety report is never retracted.
+    constraint assessments_change check (
+        restores is null or (replaces is null and answer = 'cannot_tell' and feedback_id is null)
+    )
 ) strict;
 
 create index assessments_by_study on assessments (study_id);
+create unique index assessments_one_replacement on assessments (replaces) where replaces is not null;
+create unique index assessments_one_restoration on assessments (restores) where restores is not null;
 
 create trigger assessments_no_update before update on assessments
 begin select raise(abort, 'assessments are append-only'); end;

@@ -4,9 +4,9 @@ use crate::analytic::Analytic;
 use crate::service::Service;
 use axum::body::Body;
 use axum::http::{Request, StatusCode};
-use gaitwright_store::commit;
 use gaitwright_store::studies::{AnswerSource, StudyState};
-use serde_json::json;
+use gaitwright_store::{StudyId, commit};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -16,6 +16,22 @@ pub async fn filled() -> (TempDir, PathBuf) {
     let database = folder.path().join("a.db");
     fill(&database).await;
     (folder, database)
+}
+
+/// Changes an answer about the two trials of another one, and undoes that.
+async fn change_and_undo(service: &Service, study: StudyId, content: &Value) {
+    let mut answer = json!({
+        "trial_a": content["winner"], "trial_b": content["loser"], "answer": "a", "author": "K", "replaces": null,
+    });
+    let preferences = format!("/api/v1/studies/{study}/preferences");
+    for _ in 0..2 {
+        let given = service.post(&preferences, &answer).await;
+        assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
+        answer["replaces"] = given.json()["id"].clone();
+    }
+    let newest = answer["replaces"].as_str().unwrap();
+    let undone = service.post(&format!("/api/v1/preferences/{newest}/undo"), &json!({})).await;
+    assert_eq!(undone.status, StatusCode::OK, "{}", undone.text);
 }
 
 /// Writes a record with a row in every table.
@@ -29,6 +45,7 @@ pub async fn fill(database: &Path) {
     service.wait_for(study, &[StudyState::Waiting]).await;
     let given = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
     let retract = format!("/api/v1/preferences/{}/retract", given[0]["id"].as_str().unwrap());
+    change_and_undo(&service, study, &given[0]["content"]).await;
     for (path, body) in [
         (retract, json!({"reason": "mistyped"})),
         (format!("/api/v1/subjects/{}/consents", service.subject().await), json!({"form": "form 3"})),
@@ -65,8 +82,10 @@ pub async fn fill(database: &Path) {
         "insert into lab_session_steps (lab_session_id, step, actor, created_at) values ('L', 'walk_1', 'K', '')",
         "insert into lab_answers (lab_session_id, number, answer, actor, created_at) values ('L', 1, 'first', 'K', '')",
         "insert into lab_answer_retractions (lab_session_id, number, actor, created_at) values ('L', 1, 'K', '')",
-        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, created_at) \
-         select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', '' from trials group by study_id",
+        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, replaces, created_at) \
+         select 'M', study_id, min(id), max(id), 'cannot_tell', 'clinician', 'K', 'N', '' from trials group by study_id",
+        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, restores, created_at) \
+         select 'O', study_id, trial_a, trial_b, answer, source, author, id, '' from assessments where id = 'M'",
         "insert into assessment_retractions (assessment_id, author, reason, created_at) values ('M', 'K', 'r', '')",
         "insert into safety_reviews (id, trial_id, decision, author, reason, created_at) \
          select 'I', id, 'unsafe', 'K', 'r', '' from trials limit 1",

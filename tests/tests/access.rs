@@ -75,7 +75,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as in the router. A page that is not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 79] = [
+const PAGES: [(&str, Option<Right>); 80] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -92,6 +92,7 @@ const PAGES: [(&str, Option<Right>); 79] = [
     ("get /studies/{id}/compare", Some(Right::Read)),
     ("post /studies/{id}/compare", Some(Right::Answer)),
     ("post /studies/{id}/retract", Some(Right::Answer)),
+    ("post /studies/{id}/undo", Some(Right::Answer)),
     ("get /studies/{id}/members", Some(Right::Read)),
     ("post /studies/{id}/members", Some(Right::Run)),
     ("get /subjects", Some(Right::Read)),

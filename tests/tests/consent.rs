@@ -123,6 +123,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
             json!({"trial_a": trials[0].id, "trial_b": trials[1].id, "answer": "cannot_tell"}),
         ),
         (format!("/api/v1/assessments/{assessment}/retract"), json!({"reason": "r"})),
+        (format!("/api/v1/assessments/{assessment}/undo"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/close"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/emg-results"), json!({})),
         (format!("/api/v1/lab-sessions/{session}/unblind"), json!({"reason": "r"})),
@@ -194,6 +195,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/trials/{}/execution-report", trials[0].id), json!({})),
         (format!("/api/v1/studies/{human}/raters/unblind"), json!({"rater": "not signed in", "reason": "r"})),
         (format!("/api/v1/preferences/{preference}/retract"), json!({"reason": "r"})),
+        (format!("/api/v1/preferences/{preference}/undo"), json!({})),
     ] {
         let refused = service.post(&path, &body).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}: {}", refused.text);

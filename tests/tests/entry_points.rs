@@ -74,6 +74,7 @@ const RULES: [Rule; 6] =
 
 const READS: EntryPoint = EntryPoint::None("shows or exports recorded data; no walk or answer follows from it");
 const RETRACTS: EntryPoint = EntryPoint::None("retracts an answer");
+const UNDOES: EntryPoint = EntryPoint::None("undoes an answer; `undo.rs` holds its rules");
 const RUNS: EntryPoint = EntryPoint::None("runs solves, certifications or simulations; no person answers");
 const SETS_UP: EntryPoint = EntryPoint::None("sets up subjects, devices, references, users or the service");
 
@@ -105,6 +106,9 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
         | "post /api/v1/lab-sessions/{id}/retract-answer"
         | "post /lab/{id}/retract"
         | "post /rate/pair/{code}/retract" => RETRACTS,
+        "post /api/v1/preferences/{id}/undo" | "post /api/v1/assessments/{id}/undo" | "post /studies/{id}/undo" => {
+            UNDOES
+        }
         "post /api/v1/studies/{id}/ask" | "post /api/v1/trials/{id}/tell" => {
             EntryPoint::None("the lab evaluates a trial by itself; values, and no person's answer")
         }

@@ -154,11 +154,13 @@ async fn malformed_forms_are_refused_without_server_errors() {
         format!("/studies/{study}/do"),
         format!("/studies/{study}/compare"),
         format!("/studies/{study}/retract"),
+        format!("/studies/{study}/undo"),
         "/sign-in".to_owned(),
         "/account".to_owned(),
     ];
     let names = [
         "button",
+        "saved",
         "transition",
         "a",
         "b",

@@ -72,6 +72,9 @@ async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted()
         ("update trials set gait_rmse_rad = gait_rmse_rad + 1e-12", "trials"),
         ("update studies set seed = seed + 1", "studies"),
         ("update users set role = 'administrator'", "users"),
+        ("update feedback set replaces = null where replaces is not null", "feedback"),
+        ("update feedback set restores = null where restores is not null", "feedback"),
+        ("update assessments set replaces = null where replaces is not null", "assessments"),
         (
             "insert into feedback (id, study_id, kind, trial_a, trial_b, source, author, created_at) \
              select 'x', study_id, 'no_difference', min(id), max(id), 'subject', 'K', '' from trials group by study_id",
@@ -130,6 +133,8 @@ async fn forged(connection: &mut SqliteConnection, table: &str, key: &[&str]) ->
         ("blind_pairs" | "trials" | "lab_sessions", "number") => format!("{column} + 1000"),
         (_, "hash" | "code") => "hex(randomblob(32))".to_owned(),
         ("feedback", "kind") => "'no_difference'".to_owned(),
+        // An answer is replaced once and brought back once.
+        (_, "replaces" | "restores") => "null".to_owned(),
         (_, "id" | "sha256" | "pseudonym" | "name") | ("solve_jobs", "trial_id") => "hex(randomblob(8))".to_owned(),
         (_, column) if column == last => "hex(randomblob(8))".to_owned(),
         (_, column) => column.to_owned(),

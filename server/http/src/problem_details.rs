@@ -87,6 +87,7 @@ impl From<&Error> for Problem {
             Error::MethodNotAllowed { .. } => Self::new(ProblemKind::MethodNotAllowed, detail),
             Error::Forbidden(_) => Self::new(ProblemKind::Forbidden, detail),
             Error::Conflict(_) => Self::new(ProblemKind::Conflict, detail),
+            Error::CannotBeUndone(_) => Self::new(ProblemKind::CannotBeUndone, detail),
             Error::Learner(_) => Self::new(ProblemKind::Learner, detail),
             Error::StorageFull(_) => Self::new(ProblemKind::StorageFull, detail),
             Error::NotReady(_) => Self::new(ProblemKind::NotReady, detail),

@@ -17,6 +17,8 @@ pub(super) enum ProblemKind {
     MethodNotAllowed,
     /// 409.
     Conflict,
+    /// 409, an undo.
+    CannotBeUndone,
     /// 412.
     Changed,
     /// 413.
@@ -68,13 +70,14 @@ const fn entry(
 
 impl ProblemKind {
     /// Every kind, by status.
-    pub(super) const ALL: [Self; 17] = [
+    pub(super) const ALL: [Self; 18] = [
         Self::Malformed,
         Self::NotSignedIn,
         Self::Forbidden,
         Self::NotFound,
         Self::MethodNotAllowed,
         Self::Conflict,
+        Self::CannotBeUndone,
         Self::Changed,
         Self::TooLarge,
         Self::UnsupportedMediaType,
@@ -135,6 +138,14 @@ impl ProblemKind {
                 "The request is valid, but the current state does not allow it: for example, the study has ended, the name is \
                  taken, or the subject withdrew consent. Nothing was changed.",
                 "Read the detail and the current state, then decide whether to repeat the request.",
+            ),
+            Self::CannotBeUndone => entry(
+                "/problems/cannot-be-undone",
+                StatusCode::CONFLICT,
+                "The answer cannot be undone",
+                "An answer of a person can be undone once, within two minutes, while it counts. Safety reports and answers \
+                 that an undo brought back cannot be undone. Nothing was changed.",
+                "Change the answer, or retract it with a reason. Staff review safety reports.",
             ),
             Self::Changed => entry(
                 "/problems/changed",

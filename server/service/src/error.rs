@@ -149,6 +149,9 @@ pub enum Error {
     /// The current state does not allow the request.
     #[error("{0}")]
     Conflict(String),
+    /// An answer that cannot be undone.
+    #[error("{0}")]
+    CannotBeUndone(String),
     /// The learner cannot work with the settings or answers of a study.
     #[error("The learner failed: {0}.")]
     Learner(LearnerError),

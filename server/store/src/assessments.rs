@@ -1,8 +1,8 @@
 //! Assessments: answers of staff about two gaits that state no preference.
 
 use super::blind_pairs::OrderedAnswer;
-use super::feedback::{Attribution, Retraction, Source};
-use super::{AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
+use super::feedback::{Attribution, Origin, Retraction, Source};
+use super::{AnswerId, AssessmentId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use serde::{Deserialize, Serialize};
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -79,6 +79,10 @@ pub struct Assessment {
     pub note: String,
     /// Preference that was derived from it, if any.
     pub feedback_id: Option<FeedbackId>,
+    /// The answer in whose place it was given.
+    pub replaces: Option<AnswerId>,
+    /// The assessment that it brings back, because the change to another answer was undone.
+    pub restores: Option<AssessmentId>,
     /// Time of recording.
     pub created_at: Instant,
     /// Retraction, if it was retracted.
@@ -105,6 +109,8 @@ pub struct UnsavedAssessment<'a> {
     pub attribution: Attribution<'a>,
     /// The derived preference, if any.
     pub feedback: Option<FeedbackId>,
+    /// How it relates to an earlier answer.
+    pub origin: Origin<AssessmentId>,
 }
 
 /// Adds an assessment.
@@ -114,8 +120,8 @@ pub struct UnsavedAssessment<'a> {
 pub async fn insert(db: &mut Connection, new: &UnsavedAssessment<'_>) -> StoreResult<AssessmentId> {
     let id = AssessmentId::fresh();
     sqlx::query(
-        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, note, feedback_id, created_at) \
-         values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "insert into assessments (id, study_id, trial_a, trial_b, answer, source, author, note, feedback_id, \
+         replaces, restores, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(new.study)
@@ -126,6 +132,8 @@ pub async fn insert(db: &mut Connection, new: &UnsavedAssessment<'_>) -> StoreRe
     .bind(new.attribution.author)
     .bind(new.attribution.note)
     .bind(new.feedback)
+    .bind(new.origin.replaces())
+    .bind(new.origin.restores())
     .bind(now())
     .execute(db)
     .await?;
@@ -154,15 +162,22 @@ const SELECT: &str = "select m.*, r.author as retracted_by, r.reason as retracte
                       r.created_at as retracted_at from assessments m \
                       left join assessment_retractions r on r.assessment_id = m.id ";
 
+/// The assessment with this identifier, if there is one.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn find(db: &mut Connection, id: AssessmentId) -> StoreResult<Option<Assessment>> {
+    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.id = ?"));
+    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
+}
+
 /// The assessment with this identifier.
 ///
 /// # Errors
 /// [`StoreError::Missing`], or errors of the database.
 pub async fn get(db: &mut Connection, id: AssessmentId) -> StoreResult<Assessment> {
-    let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.id = ?"));
-    let row = sqlx::query(sql).bind(id).fetch_optional(db).await?;
-    let missing = || StoreError::Missing { what: "assessment", id: id.to_string() };
-    row.as_ref().map(from_row).transpose()?.ok_or_else(missing)
+    find(db, id).await?.ok_or_else(|| StoreError::Missing { what: "assessment", id: id.to_string() })
 }
 
 /// Every assessment of a study, by time, including retracted ones.
@@ -173,6 +188,24 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<Vec<As
     let sql = sqlx::AssertSqlSafe(format!("{SELECT} where m.study_id = ? order by m.id"));
     let rows = sqlx::query(sql).bind(study).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
+}
+
+/// The assessment that brings another one back.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn restoration(db: &mut Connection, id: AssessmentId) -> StoreResult<Option<AssessmentId>> {
+    Ok(sqlx::query_scalar("select id from assessments where restores = ?").bind(id).fetch_optional(db).await?)
+}
+
+/// Whether a preference was derived from an assessment.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn is_derived(db: &mut Connection, preference: FeedbackId) -> StoreResult<bool> {
+    let study = "select study_id from feedback where id = ?1";
+    let sql = format!("select exists (select 1 from assessments where feedback_id = ?1 and study_id = ({study}))");
+    Ok(sqlx::query_scalar(sqlx::AssertSqlSafe(sql)).bind(preference).fetch_one(db).await?)
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<Assessment> {
@@ -186,6 +219,8 @@ fn from_row(row: &SqliteRow) -> StoreResult<Assessment> {
         author: row.try_get("author")?,
         note: row.try_get("note")?,
         feedback_id: row.try_get("feedback_id")?,
+        replaces: row.try_get("replaces")?,
+        restores: row.try_get("restores")?,
         created_at: row.try_get("created_at")?,
         retraction: Retraction::from_row(row)?,
     })

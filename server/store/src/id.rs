@@ -123,6 +123,10 @@ identifier!(
     AssessmentId
 );
 identifier!(
+    /// Identifier of an answer to a comparison: of a preference or of an assessment.
+    AnswerId
+);
+identifier!(
     /// Identifier of a safety report.
     SafetyReportId
 );
@@ -158,3 +162,27 @@ macro_rules! holds_safety_reports {
     };
 }
 holds_safety_reports!(BlindPairId, AssessmentId, LabSessionId);
+
+impl From<FeedbackId> for AnswerId {
+    fn from(preference: FeedbackId) -> Self {
+        Self(preference.0)
+    }
+}
+
+impl From<AssessmentId> for AnswerId {
+    fn from(assessment: AssessmentId) -> Self {
+        Self(assessment.0)
+    }
+}
+
+impl AnswerId {
+    /// The identifier, if the answer is a preference.
+    pub fn of_preference(self) -> FeedbackId {
+        FeedbackId(self.0)
+    }
+
+    /// The identifier, if the answer is an assessment.
+    pub fn of_assessment(self) -> AssessmentId {
+        AssessmentId(self.0)
+    }
+}

@@ -87,9 +87,9 @@ pub use connection::Connection;
 pub use error::{OnConstraint, StoreError, StoreResult};
 pub use free_disk_space::{DEFAULT_RESERVE_BYTES, free_bytes};
 pub use id::{
-    AssessmentId, BackupId, BlindPairId, ControllerFileDownloadId, DeviceId, EmgResultId, FeedbackId, LabSessionId,
-    MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, SolveJobId, StudyId,
-    SubjectId, TokenId, TrialId, UserId,
+    AnswerId, AssessmentId, BackupId, BlindPairId, ControllerFileDownloadId, DeviceId, EmgResultId, FeedbackId,
+    LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, SolveJobId,
+    StudyId, SubjectId, TokenId, TrialId, UserId,
 };
 pub use schema_versions::SCHEMA_VERSION;
 pub use time::{Instant, now, set_machine_clock};

@@ -60,7 +60,18 @@ pub(super) fn of_source<'a>(rows: &'a mut Rows, source: &str) -> &'a mut Value {
 
 type Forgery = (&'static str, fn(&mut Rows), &'static str);
 
-pub(super) const FORGERIES: [Forgery; 69] = [
+/// Adds a copy of an answer under another number and name, with changes. Returns its identifier.
+fn add_answer(rows: &mut Rows, number: u32, author: &str, change: impl FnOnce(&mut Value)) -> Value {
+    let mut row = of_source(rows, "clinician").clone();
+    row["seq"] = (90_000 + number).into();
+    row["id"] = format!("01900000-0000-7000-8000-{number:012}").into();
+    row["author"] = author.into();
+    change(&mut row);
+    rows.add("feedback", row.clone());
+    row["id"].clone()
+}
+
+pub(super) const FORGERIES: [Forgery; 74] = [
     ("a better RMSE", |r| r.first("trials")["gait_rmse_rad"] = 0.01.into(), "its results differ from its solve report"),
     ("a better RMSE everywhere", |r| everywhere(r, "gait_rmse_rad", 0.01), "its stated gait_rmse_rad is 0.01"),
     ("a negative RMSE", |r| everywhere(r, "gait_rmse_rad", -1.0), "it must be a finite number of at least 0"),
@@ -264,7 +275,7 @@ pub(super) const FORGERIES: [Forgery; 69] = [
             let place = r.0.iter().position(|(_, row)| row["kind"] == "label").unwrap();
             r.0.remove(place);
         },
-        "7 have a label",
+        "the number of labels is 7",
     ),
     (
         "a preference of Gait RMSE turned",
@@ -308,6 +319,48 @@ pub(super) const FORGERIES: [Forgery; 69] = [
             }
         },
         "has already answered this comparison",
+    ),
+    (
+        "an answer in place of nothing",
+        |r| {
+            add_answer(r, 1, "Nina", |row| row["replaces"] = "01900000-0000-7000-8000-000000000009".into());
+        },
+        "replaces no answer about its two trials",
+    ),
+    (
+        "an answer in place of one that counts",
+        |r| {
+            let first = add_answer(r, 1, "Nina", |_| ());
+            add_answer(r, 2, "Olga", |row| row["replaces"] = first);
+        },
+        "replaces an answer that still counts",
+    ),
+    (
+        "an answer replaced twice",
+        |r| {
+            let first = of_source(r, "clinician")["id"].clone();
+            add_answer(r, 1, "Nina", |row| row["replaces"] = first.clone());
+            add_answer(r, 2, "Olga", |row| row["replaces"] = first);
+        },
+        "feedback.replaces",
+    ),
+    (
+        "an answer brought back without an undo",
+        |r| {
+            let first = of_source(r, "clinician")["id"].clone();
+            add_answer(r, 1, "K", |row| row["restores"] = first);
+        },
+        "brings back an answer whose change was not undone",
+    ),
+    (
+        "another answer than the one to bring back",
+        |r| {
+            let first = of_source(r, "clinician")["id"].clone();
+            add_answer(r, 1, "K", |row| row["replaces"] = first.clone());
+            r.copy("feedback_retractions", |retraction| retraction["feedback_seq"] = 90_001.into());
+            add_answer(r, 2, "Nina", |row| row["restores"] = first);
+        },
+        "differs from the answer that it brings back",
     ),
     (
         "an answer from before its trials",

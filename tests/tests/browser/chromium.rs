@@ -7,7 +7,8 @@ use chromiumoxide::cdp::browser_protocol::emulation::{
     SetTouchEmulationEnabledParams,
 };
 use chromiumoxide::cdp::browser_protocol::input::{
-    DispatchTouchEventParams, DispatchTouchEventReturns, DispatchTouchEventType, InsertTextParams, TouchPoint,
+    DispatchKeyEventParams, DispatchKeyEventType, DispatchTouchEventParams, DispatchTouchEventReturns,
+    DispatchTouchEventType, InsertTextParams, TouchPoint,
 };
 use chromiumoxide::cdp::browser_protocol::log::{self, EventEntryAdded};
 use chromiumoxide::cdp::browser_protocol::network::{self, EventRequestWillBeSent};
@@ -23,6 +24,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::task::JoinHandle;
 
+/// The control key among the modifiers of a key event.
+const CONTROL: i64 = 2;
 /// Number of attempts to click an element that is replaced meanwhile.
 const CLICKS: u32 = 20;
 /// An element that has not moved for this long stays where it is.
@@ -332,6 +335,19 @@ impl Tab {
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
         panic!("no page to press {key} on");
+    }
+
+    /// Presses a letter while the control key is held.
+    pub(crate) async fn press_with_control(&self, letter: &str) {
+        for kind in [DispatchKeyEventType::RawKeyDown, DispatchKeyEventType::KeyUp] {
+            let pressed = DispatchKeyEventParams {
+                modifiers: Some(CONTROL),
+                key: Some(letter.to_owned()),
+                code: Some(format!("Key{}", letter.to_uppercase())),
+                ..DispatchKeyEventParams::new(kind)
+            };
+            self.page.execute(pressed).await.unwrap();
+        }
     }
 
     /// How many elements there are.

@@ -1,5 +1,6 @@
 //! Staff compare two gaits: one press for each answer, and undo.
 
+use crate::axe::Axe;
 use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::StudyId;
@@ -47,6 +48,40 @@ async fn browser_staff_answer_with_one_click_and_undo_within_five_seconds() {
     page.wait_until("document.querySelector('.notice.good')?.textContent.includes('(retracted)') ?? false").await;
     let undone = answers(&site, study, "K1").await.remove(0).retraction.unwrap();
     assert_eq!((undone.author.as_str(), undone.reason.as_str()), ("K1", "undone immediately after answering"));
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_undo_of_a_changed_answer_brings_the_former_one_back() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = waiting(&site, 5).await;
+    let page = asked(&browser, &site, study).await;
+    page.run("document.activeElement.blur()").await;
+    page.press("ArrowLeft").await;
+    page.wait_for(".notice.good [data-undo]").await;
+    let first = answers(&site, study, "K1").await.remove(0);
+    // The answer is changed on the page of the study, with a key, and the change is undone with Ctrl+Z.
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    page.click("#answers a[href*='change=']").await;
+    page.answer("no_difference").await;
+    page.press("2").await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('no difference between') ?? false")
+        .await;
+    page.wait_until("document.querySelector('[data-left]').textContent !== ''").await;
+    page.press_with_control("z").await;
+    page.wait_until("document.querySelector('.notice.good')?.textContent.includes('counts again') ?? false").await;
+    let rows = answers(&site, study, "K1").await;
+    let standing: Vec<_> = rows.iter().filter(|row| row.retraction.is_none()).collect();
+    assert_eq!((rows.len(), standing.len()), (3, 1), "{rows:?}");
+    assert_eq!((standing[0].content, standing[0].restores), (first.content, Some(first.id)));
+    assert_eq!(page.count("[data-undo]").await, 0, "an undo cannot be undone");
+    assert_eq!(page.count(".notice.good details").await, 1, "a reason retracts it later");
+    if let Some(axe) = Axe::find() {
+        let complaints = axe.complaints(&page).await;
+        assert!(complaints.is_empty(), "{complaints:?}");
+    }
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

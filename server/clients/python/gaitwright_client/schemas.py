@@ -10,6 +10,9 @@ from typing import Any, Literal, Optional, TypedDict, Union
 # Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was refused.
 AccessKind = Literal["view", "export", "refused"]
 
+# Identifier of an answer to a comparison: of a preference or of an assessment.
+AnswerId = str
+
 # Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study waits
 # for them; `both`, Gait RMSE answers, and people can add answers.
 AnswerSource = Literal["gait_rmse", "people", "both"]
@@ -263,6 +266,13 @@ class AnswerRetraction(_AnswerRetractionRequired, total=False):
     author: Optional[str]
 
 
+class AnswerUndo(TypedDict, total=False):
+    """Undo of an answer."""
+
+    # Who undoes the answer. Defaults to the caller's name.
+    author: Optional[str]
+
+
 class AskRequest(TypedDict, total=False):
     """A request for a trial."""
 
@@ -296,6 +306,11 @@ class Assessment(_AssessmentRequired, total=False):
 
     # Preference that was derived from it. Null if there is none.
     feedback_id: Optional[FeedbackId]
+    # Identifier of the preference or assessment that it replaced. Null if it replaced none.
+    replaces: Optional[AnswerId]
+    # Identifier of the assessment that it brings back, because the answer that had replaced that one was undone. Null
+    # otherwise.
+    restores: Optional[AssessmentId]
     # Retraction. Null if the assessment was not retracted.
     retraction: Optional[Retraction]
 
@@ -331,7 +346,7 @@ AuditDetail = TypedDict(
         "answer": "str",
         # `study.change`: whether the study is archived.
         "archived": "bool",
-        # Author of the answer, report, review or retraction.
+        # Author of the answer, report, review, retraction or undo.
         "author": "str",
         # Values before the change: `study.change`, `subject.correct`, `user.role`.
         "before": "AuditedBefore",
@@ -416,6 +431,10 @@ AuditDetail = TypedDict(
         "recordings": "list[MeasurementFileId]",
         # `trial.explain`: name of the bound that gives a gait if it is relaxed. Null if there is none.
         "relaxed_bound": "Optional[str]",
+        # `preference.give`, `assessment.give`: the answer that it replaced. Null if it replaced none.
+        "replaces": "Optional[AnswerId]",
+        # `preference.undo`, `assessment.undo`: the new entry of the answer that counts again. Null if there is none.
+        "restored": "Optional[AnswerId]",
         # Whether only members see the study: `study.create`, `study.restrict`.
         "restricted": "bool",
         # `lab_session.process`: the processed EMG.
@@ -907,6 +926,11 @@ class _PreferenceRequired(TypedDict):
 class Preference(_PreferenceRequired, total=False):
     """A preference or a suggestion of a study."""
 
+    # Identifier of the preference or assessment that it replaced. Null if it replaced none.
+    replaces: Optional[AnswerId]
+    # Identifier of the preference that it brings back, because the answer that had replaced that one was undone. Null
+    # otherwise.
+    restores: Optional[FeedbackId]
     # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
 
@@ -2026,6 +2050,9 @@ class NewAssessment(_NewAssessmentRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
+    # Identifier of the preference or assessment that this assessment replaces: an answer of a person about the same two
+    # trials, which no longer counts. If this assessment is undone, the replaced one counts again.
+    replaces: Optional[AnswerId]
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
     source: Optional[PersonSource]
@@ -2140,6 +2167,9 @@ class NewPreference(_NewPreferenceRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
+    # Identifier of the preference or assessment that this answer replaces: an answer of a person about the same two
+    # trials, which no longer counts. If this answer is undone, the replaced one counts again.
+    replaces: Optional[AnswerId]
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
     source: Optional[PersonSource]
@@ -2677,6 +2707,15 @@ class RelaxedBound(_RelaxedBoundRequired, total=False):
     # The value nearest to the given one that gives a gait together with the others. Null if not even the loosest value
     # does.
     to: Optional[float]
+
+
+class RestoredAnswer(TypedDict, total=False):
+    """The answer that counts again after an undo. Both fields are null if the undone answer replaced none."""
+
+    # The new entry with the content of the replaced assessment.
+    assessment: Optional[Assessment]
+    # The new entry with the content of the replaced preference.
+    preference: Optional[Preference]
 
 
 class ResultDerivatives(TypedDict):

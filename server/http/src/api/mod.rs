@@ -35,6 +35,7 @@ mod subjects;
 mod suggestions;
 mod tokens;
 mod trials;
+mod undo;
 mod users;
 mod walk_controller_files;
 
@@ -136,10 +137,12 @@ pub fn routes() -> OpenApiRouter<AppState> {
         // answers
         .routes(routes!(preferences::get))
         .routes(routes!(preferences::retract))
+        .routes(routes!(undo::preference))
         .routes(routes!(suggestions::of_study, suggestions::create))
         .routes(routes!(assessments::of_study, assessments::create))
         .routes(routes!(assessments::get))
         .routes(routes!(assessments::retract))
+        .routes(routes!(undo::assessment))
         .routes(routes!(safety_reports::of_study))
         .routes(routes!(safety_reports::report))
         .routes(routes!(safety_reports::review))

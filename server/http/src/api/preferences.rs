@@ -81,6 +81,8 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
         "created_at",
         "retracted_at",
         "retraction_reason",
+        "replaces",
+        "restores",
     ]);
     for row in rows {
         let (kind, a, b) = match row.content {
@@ -101,6 +103,8 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
             row.created_at.to_string(),
             retraction.map(|r| r.created_at.to_string()),
             retraction.map(|r| &r.reason),
+            row.replaces.map(|id| id.to_string()),
+            row.restores.map(|id| id.to_string()),
         ]);
     }
     table
@@ -136,7 +140,7 @@ pub(super) struct CreatedPreference {
 /// Create a preference
 ///
 /// Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author can
-/// give only one answer per pair of gaits; to change an answer, retract it first.
+/// give only one answer per pair of gaits; to change an answer, name it in `replaces`.
 #[utoipa::path(
     post,
     path = "/studies/{id}/preferences",
@@ -178,7 +182,8 @@ pub(super) struct AnswerRetraction {
 
 /// Retract a preference
 ///
-/// The preference stays on record, but the learner no longer uses it.
+/// The preference stays on record, but the learner no longer uses it. An answer that it replaced does not count again:
+/// for that, undo it.
 #[utoipa::path(
     post,
     path = "/preferences/{id}/retract",

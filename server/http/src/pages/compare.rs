@@ -1,11 +1,11 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::compare_answer::{AnswerForm, AnswerOutcome, LABELS, Recorded, give};
+use super::compare_answer::{AnswerForm, AnswerOutcome, LABELS, give};
 use super::page_chart::{PageChart, shared_legend};
-use super::study::{answer_in_words, assessment_in_words};
-use super::undo::undo_seconds;
+use super::saved_answer::SavedAnswer;
 use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
+use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::figures::trial;
@@ -24,14 +24,13 @@ use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::MANY;
 use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
-use gaitwright_service::studies::preference_answer;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::undo;
 use gaitwright_service::studies::walkable;
-use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
+use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
-    Connection, FeedbackId, Instant, StudyId, TrialId, assessments, events, feedback, gaits, reference_gaits, studies,
-    trials,
+    AnswerId, FeedbackId, StudyId, TrialId, commit, events, gaits, reference_gaits, studies, trials,
 };
 use serde::Deserialize;
 use std::str::FromStr;
@@ -41,9 +40,9 @@ use std::str::FromStr;
 pub(super) struct GaitsQuery {
     a: Option<TrialId>,
     b: Option<TrialId>,
-    saved: Option<Recorded>,
+    saved: Option<AnswerId>,
     /// The answer to change; the page shows its comparison.
-    change: Option<Recorded>,
+    change: Option<AnswerId>,
 }
 
 #[derive(Template)]
@@ -121,36 +120,6 @@ struct OfferedGait {
     as_b: bool,
 }
 
-/// An answer, read from the record.
-struct SavedAnswer {
-    id: Recorded,
-    text: String,
-    /// The answer as the form sends it.
-    given: &'static str,
-    author: String,
-    source: Source,
-    note: String,
-    at: Instant,
-    retracted: bool,
-    is_safety_report: bool,
-    /// The gaits of the comparison.
-    pair: Option<(TrialId, TrialId)>,
-    /// Answers of others to the same comparison: author and text.
-    other_answers: Vec<(String, String)>,
-}
-
-impl SavedAnswer {
-    /// Whether another answer can replace it.
-    fn may_be_changed(&self) -> bool {
-        !self.retracted && !self.is_safety_report && self.pair.is_some()
-    }
-
-    /// Seconds for which the page offers *Undo*, if the answer is new.
-    fn undo(&self) -> Option<f64> {
-        undo_seconds(self.at).filter(|_| !self.retracted && !self.is_safety_report)
-    }
-}
-
 /// How many trials of a large study are offered.
 const OFFERED: u32 = 200;
 
@@ -202,14 +171,14 @@ async fn show(
         StudySnapshot::read(&mut reader, study).await?
     };
     let saved = match choice.change.or(choice.saved) {
-        Some(saved) => read_back(&mut reader, &snapshot, saved).await?,
+        Some(saved) => SavedAnswer::read(&mut reader, &snapshot, saved).await?,
         None => None,
     };
     let (changes, choice, typed) =
         match saved.as_ref().filter(|saved| choice.change.is_some() && saved.may_be_changed()) {
             Some(saved) => {
                 let (a, b) = saved.pair.unzip();
-                let typed = if refused.is_none() { AnswerForm::of(saved) } else { typed };
+                let typed = if refused.is_none() { saved.form() } else { typed };
                 (true, GaitsQuery { a, b, ..choice }, typed)
             }
             None => (false, choice, typed),
@@ -290,57 +259,6 @@ async fn show(
     })
 }
 
-/// Reads an answer from the record; `None` if its trials are not in the snapshot.
-async fn read_back(
-    db: &mut Connection,
-    snapshot: &StudySnapshot,
-    saved: Recorded,
-) -> Result<Option<SavedAnswer>, Error> {
-    Ok(match saved {
-        Recorded::Preference(id) => {
-            let row = feedback::get(db, id).await?;
-            if row.study_id != snapshot.study.id {
-                return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
-            }
-            let in_words = |other: FeedbackRow| Some((other.author.clone(), answer_in_words(&other, snapshot)?));
-            let other_answers =
-                preference_answer::other_answers(db, &row).await?.into_iter().filter_map(in_words).collect();
-            answer_in_words(&row, snapshot).map(|text| SavedAnswer {
-                id: saved,
-                text,
-                given: given(&row.content),
-                author: row.author.clone(),
-                source: row.source,
-                note: row.note.clone(),
-                at: row.created_at,
-                retracted: row.retraction.is_some(),
-                is_safety_report: false,
-                pair: compared(&row.content),
-                other_answers,
-            })
-        }
-        Recorded::Assessment(id) => {
-            let assessment = assessments::get(db, id).await?;
-            if assessment.study_id != snapshot.study.id {
-                return Err(Error::NotFound { what: "assessment".to_owned(), id: id.to_string() });
-            }
-            assessment_in_words(&assessment, snapshot).map(|text| SavedAnswer {
-                id: saved,
-                text,
-                given: "cannot_tell",
-                author: assessment.author.clone(),
-                source: assessment.source,
-                note: assessment.note.clone(),
-                at: assessment.created_at,
-                retracted: assessment.retraction.is_some(),
-                is_safety_report: assessment.answer.is_about_safety(),
-                pair: Some(assessment.pair()),
-                other_answers: Vec::new(),
-            })
-        }
-    })
-}
-
 /// `POST /studies/{id}/compare`.
 pub(super) async fn post(
     authorized: Authorized<access::Answer>,
@@ -374,34 +292,40 @@ pub(super) async fn post(
     Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(why))).await?).into_response())
 }
 
-impl AnswerForm {
-    /// The form with an answer that was given.
-    fn of(saved: &SavedAnswer) -> Self {
-        Self {
-            answer: saved.given.to_owned(),
-            source: saved.source.as_str().to_owned(),
-            author: saved.author.clone(),
-            note: saved.note.clone(),
-            ..Self::default()
+/// The form to undo an answer.
+#[derive(Debug, Deserialize)]
+pub(super) struct UndoForm {
+    saved: AnswerId,
+    author: String,
+}
+
+/// `POST /studies/{id}/undo`.
+pub(super) async fn undo(
+    authorized: Authorized<access::Answer>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<StudyId, access::Answer>,
+    Form(form): Form<UndoForm>,
+) -> Result<Response, PageError> {
+    let (caller, saved) = (&authorized.caller, form.saved);
+    let mut writer = app.write().await?;
+    // A form that is sent twice (double click, lost response) counts once.
+    if let Some(shown) = undo::outcome(&mut writer, id, saved).await? {
+        return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={shown}")).into_response());
+    }
+    match undo::undo(&mut writer, caller, Some(id), saved, Some(&form.author)).await {
+        Ok(restored) => {
+            commit(writer).await?;
+            app.scheduler.changed();
+            let shown = restored.unwrap_or(saved);
+            Ok(Redirect::to(&format!("/studies/{id}/compare?saved={shown}")).into_response())
         }
-    }
-}
-
-/// A preference as the form sends it, for the pair of [`compared`].
-fn given(content: &FeedbackContent) -> &'static str {
-    match content {
-        FeedbackContent::Preference { winner, loser } if winner < loser => "a",
-        FeedbackContent::Preference { .. } => "b",
-        FeedbackContent::NoDifference { .. } => "no_difference",
-        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => "",
-    }
-}
-
-/// The two trials of an answer, the earlier one first, so that the order does not repeat the answer.
-fn compared(content: &FeedbackContent) -> Option<(TrialId, TrialId)> {
-    match *content {
-        FeedbackContent::Preference { winner: one, loser: other }
-        | FeedbackContent::NoDifference { a: one, b: other } => Some((one.min(other), one.max(other))),
-        FeedbackContent::Label { .. } | FeedbackContent::Suggestion { .. } => None,
+        Err(error @ Error::CannotBeUndone(_)) => {
+            drop(writer);
+            let choice = GaitsQuery { saved: Some(saved), ..GaitsQuery::default() };
+            let typed = (user_of(caller), AnswerForm::default());
+            let shown = Box::pin(show(&mut app, id, choice, typed, Some(error.to_string()))).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
     }
 }

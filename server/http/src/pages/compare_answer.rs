@@ -13,45 +13,15 @@ use gaitwright_service::printable;
 use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::feedback_log::{self, CurrentAnswer};
 use gaitwright_service::studies::preference_answer::{self, Answer, PairAnswer};
+use gaitwright_service::studies::recorded_answer::RecordedAnswer;
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
-use gaitwright_store::{AssessmentId, Connection, FeedbackId, StudyId, Writer, commit};
+use gaitwright_store::{AnswerId, Connection, FeedbackId, StudyId, commit};
 use serde::Deserialize;
-use std::fmt;
 use std::str::FromStr;
-
-/// The row of an answer in the record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "String")]
-pub(super) enum Recorded {
-    Preference(FeedbackId),
-    Assessment(AssessmentId),
-}
-
-impl fmt::Display for Recorded {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Preference(id) => id.fmt(f),
-            Self::Assessment(id) => write!(f, "{ASSESSMENT}{id}"),
-        }
-    }
-}
-
-impl TryFrom<String> for Recorded {
-    type Error = Error;
-    fn try_from(text: String) -> Result<Self, Error> {
-        match text.strip_prefix(ASSESSMENT) {
-            Some(id) => Ok(Self::Assessment(identifier("saved", id)?)),
-            None => Ok(Self::Preference(identifier("saved", &text)?)),
-        }
-    }
-}
-
-/// Before the identifier of an assessment.
-const ASSESSMENT: &str = "assessment-";
 
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -96,8 +66,8 @@ impl GivenAnswer {
 
 impl AnswerForm {
     /// The answer that this one replaces.
-    pub(super) fn changed(&self) -> Result<Option<Recorded>, Error> {
-        if self.changes.is_empty() { Ok(None) } else { Recorded::try_from(self.changes.clone()).map(Some) }
+    pub(super) fn changed(&self) -> Result<Option<AnswerId>, Error> {
+        if self.changes.is_empty() { Ok(None) } else { identifier("changes", &self.changes).map(Some) }
     }
 
     fn read(&self) -> Result<(GivenAnswer, FeedbackId), Error> {
@@ -105,13 +75,14 @@ impl AnswerForm {
             .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
         let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
         let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
+        let replaces = self.changed()?;
         let preference = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            GivenAnswer::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note })
+            GivenAnswer::Preference(Answer { trial_a: a, trial_b: b, answer, source, author, note, replaces })
         };
         let assessment = |answer| {
             let (author, note) = (author.clone(), note.clone());
-            GivenAnswer::Assessment(NewAssessment { trial_a: a, trial_b: b, answer, source, author, note })
+            GivenAnswer::Assessment(NewAssessment { trial_a: a, trial_b: b, answer, source, author, note, replaces })
         };
         let given = match self.answer.as_str() {
             "a" => preference(PairAnswer::A),
@@ -144,11 +115,11 @@ fn identifier<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
 /// The outcome of a submitted form.
 pub(super) enum AnswerOutcome {
     /// The answer is recorded, now or before.
-    Saved(Recorded),
+    Saved(AnswerId),
     /// The same form was sent before with another answer, which is the recorded one.
-    SameForm(Recorded),
+    SameForm(AnswerId),
     /// The same author answered this comparison before; that answer is the recorded one.
-    AnsweredBefore(Recorded),
+    AnsweredBefore(AnswerId),
 }
 
 /// The labels of the form.
@@ -179,23 +150,21 @@ pub(super) async fn give(
     let is_reviewed = before.is_some() && !given.is_still_in_force(&mut writer, id).await?;
     if let Some(before) = before.filter(|_| !is_reviewed) {
         let same = before.request == request;
-        let recorded = Recorded::try_from(before.body)?;
+        let recorded = identifier("saved", &before.body)?;
         return Ok(if same { AnswerOutcome::Saved(recorded) } else { AnswerOutcome::SameForm(recorded) });
-    }
-    if let Some(changed) = form.changed()? {
-        retract_recorded(&mut writer, caller, id, changed, (&form.author, CHANGED)).await?;
     }
     // A second answer is refused, and the page shows the first one. A safety report is always accepted.
     if !given.is_about_safety()
         && let Some(saved) = answered_elsewhere(&mut writer, id, form).await?
+        && !changes_own(&mut writer, id, form).await?
     {
         return Ok(AnswerOutcome::AnsweredBefore(saved));
     }
     let saved = match given {
         GivenAnswer::Preference(answer) => {
-            Recorded::Preference(preference_answer::give(&mut writer, caller, id, &answer).await?)
+            AnswerId::from(preference_answer::give(&mut writer, caller, id, &answer).await?)
         }
-        GivenAnswer::Assessment(new) => Recorded::Assessment(assessment::give(&mut writer, caller, id, &new).await?),
+        GivenAnswer::Assessment(new) => assessment::give(&mut writer, caller, id, &new).await?.into(),
     };
     if !is_reviewed {
         let kept = StoredResponse { request, status: 303, location: None, body: saved.to_string() };
@@ -207,42 +176,27 @@ pub(super) async fn give(
 }
 
 /// The current answer of the same author to the same comparison, given in another tab or elsewhere.
-async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<Option<Recorded>, Error> {
+async fn answered_elsewhere(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<Option<AnswerId>, Error> {
     let pair = (identifier("trial_a", &form.a)?, identifier("trial_b", &form.b)?);
     let author = printable::name("author", &form.author, 80)?;
     Ok(feedback_log::current_answer(db, study, pair, author).await?.and_then(|answer| match answer {
-        CurrentAnswer::Preference(id) => Some(Recorded::Preference(id)),
-        CurrentAnswer::Assessment(id) => Some(Recorded::Assessment(id)),
+        CurrentAnswer::Preference(id) => Some(id.into()),
+        CurrentAnswer::Assessment(id) => Some(id.into()),
         // The page shows no blinded answer, and no suggestion as an answer: the refusal says that there is one.
         CurrentAnswer::Blind(_) | CurrentAnswer::Suggestion(_) => None,
     }))
 }
 
-/// The reason in the record of an answer that another one replaced.
-const CHANGED: &str = "changed to another answer";
-
-async fn retract_recorded(
-    writer: &mut Writer,
-    caller: &Caller,
-    study: StudyId,
-    recorded: Recorded,
-    (author, reason): (&str, &str),
-) -> Result<(), Error> {
-    match recorded {
-        Recorded::Preference(given) => {
-            preference_answer::retract(writer, caller, Some(study), given, Some(author), reason).await?;
-        }
-        Recorded::Assessment(made) => {
-            assessment::retract(writer, caller, Some(study), made, (Some(author), reason)).await?;
-        }
-    }
-    Ok(())
+/// Whether the form changes an answer of the same author that counts.
+async fn changes_own(db: &mut Connection, study: StudyId, form: &AnswerForm) -> Result<bool, Error> {
+    let Some(changed) = form.changed()? else { return Ok(false) };
+    Ok(RecordedAnswer::get(db, Some(study), changed).await?.is_in_force_by(&form.author))
 }
 
 /// The form to retract an answer.
 #[derive(Debug, Deserialize)]
 pub(super) struct RetractForm {
-    saved: Recorded,
+    saved: AnswerId,
     author: String,
     reason: String,
 }
@@ -255,7 +209,15 @@ pub(super) async fn retract(
     Form(form): Form<RetractForm>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    retract_recorded(&mut writer, &authorized.caller, id, form.saved, (&form.author, &form.reason)).await?;
+    let (caller, author, reason) = (&authorized.caller, Some(form.author.as_str()), form.reason.as_str());
+    match RecordedAnswer::get(&mut writer, Some(id), form.saved).await? {
+        RecordedAnswer::Preference(row) => {
+            preference_answer::retract(&mut writer, caller, Some(id), row.id, author, reason).await?;
+        }
+        RecordedAnswer::Assessment(row) => {
+            assessment::retract(&mut writer, caller, Some(id), row.id, (author, reason)).await?;
+        }
+    }
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))

@@ -34,6 +34,7 @@ mod recording_preview;
 mod reference_gaits;
 mod safety_review;
 mod saved;
+mod saved_answer;
 mod sensitivities;
 mod sign_in;
 mod simulated_walks;
@@ -70,6 +71,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
         .route("/studies/{id}/retract", post(compare_answer::retract))
+        .route("/studies/{id}/undo", post(compare::undo))
         .route("/studies/{id}/members", get(members::get).post(members::post))
         .route("/subjects", get(subjects::list).post(subjects::add))
         .route("/subjects/{id}", get(subject::get))

@@ -3,7 +3,7 @@
 use super::feedback::Retraction;
 use gaitwright_store::assessments::{self, AssessmentAnswer};
 use gaitwright_store::feedback::Source;
-use gaitwright_store::{AssessmentId, FeedbackId, Instant, StudyId, TrialId};
+use gaitwright_store::{AnswerId, AssessmentId, FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -28,6 +28,11 @@ pub(crate) struct Assessment {
     note: String,
     /// Preference that was derived from it. Null if there is none.
     feedback_id: Option<FeedbackId>,
+    /// Identifier of the preference or assessment that it replaced. Null if it replaced none.
+    replaces: Option<AnswerId>,
+    /// Identifier of the assessment that it brings back, because the answer that had replaced that one was undone.
+    /// Null otherwise.
+    restores: Option<AssessmentId>,
     /// Time of recording.
     created_at: Instant,
     /// Retraction. Null if the assessment was not retracted.
@@ -46,6 +51,8 @@ impl From<assessments::Assessment> for Assessment {
             author,
             note,
             feedback_id,
+            replaces,
+            restores,
             created_at,
             retraction,
         } = row;
@@ -59,6 +66,8 @@ impl From<assessments::Assessment> for Assessment {
             author,
             note,
             feedback_id,
+            replaces,
+            restores,
             created_at,
             retraction: retraction.map(Into::into),
         }

@@ -3,7 +3,7 @@
 use gait_learner::ActionIndex;
 use gaitwright_store::feedback::{self, Source};
 use gaitwright_store::trials::Label;
-use gaitwright_store::{FeedbackId, Instant, StudyId, TrialId};
+use gaitwright_store::{AnswerId, FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -28,6 +28,11 @@ pub(crate) struct Preference {
     by_rater: bool,
     /// Whether the rater could have known the allocation. If so, it does not count as blind.
     could_have_known: bool,
+    /// Identifier of the preference or assessment that it replaced. Null if it replaced none.
+    replaces: Option<AnswerId>,
+    /// Identifier of the preference that it brings back, because the answer that had replaced that one was undone.
+    /// Null otherwise.
+    restores: Option<FeedbackId>,
     /// Time of recording.
     created_at: Instant,
     /// Retraction. Null if it was not retracted.
@@ -46,6 +51,8 @@ impl From<feedback::FeedbackRow> for Preference {
             note,
             by_rater,
             could_have_known,
+            replaces,
+            restores,
             created_at,
             retraction,
         } = row;
@@ -59,6 +66,8 @@ impl From<feedback::FeedbackRow> for Preference {
             note,
             by_rater,
             could_have_known,
+            replaces,
+            restores,
             created_at,
             retraction: retraction.map(Into::into),
         }

@@ -3,12 +3,13 @@
 
 use super::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use super::preference_answer::attribution;
+use super::recorded_answer;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::assessments::{self, Assessment, AssessmentAnswer};
-use gaitwright_store::feedback::Source;
-use gaitwright_store::{AssessmentId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
+use gaitwright_store::feedback::{Origin, Source};
+use gaitwright_store::{AnswerId, AssessmentId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -36,6 +37,10 @@ pub struct NewAssessment {
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub note: String,
+    /// Identifier of the preference or assessment that this assessment replaces: an answer of a person about the same two
+    /// trials, which no longer counts. If this assessment is undone, the replaced one counts again.
+    #[serde(default)]
+    pub replaces: Option<AnswerId>,
 }
 
 /// Writes an assessment.
@@ -50,18 +55,28 @@ pub async fn give(
 ) -> Result<AssessmentId, Error> {
     let study = studies::get(writer, study).await?;
     let attribution = attribution(caller, new.source, new.author.as_deref(), &new.note)?;
+    let pair = (new.trial_a, new.trial_b);
+    let (second_answer, replaces) =
+        match recorded_answer::replace(writer, (study.id, pair), new.replaces, attribution.author).await {
+            // A safety report is accepted even if the answer to change no longer counts.
+            Err(Error::Conflict(_)) if new.answer.is_about_safety() => (SecondAnswer::Refused, None),
+            second_answer => (second_answer?, new.replaces),
+        };
     let statement = AttributedAnswer {
         study: study.id,
-        pair: (new.trial_a, new.trial_b),
+        pair,
         fields: ("trial_a", "trial_b"),
         answer: new.answer.into(),
         attribution,
-        second_answer: SecondAnswer::Refused,
+        second_answer,
+        replaces,
     };
     let id = write(writer, statement).await?;
     let (trial_a, trial_b, author) = (new.trial_a, new.trial_b, attribution.author);
-    let detail =
-        json!({ "study": study.id, "trial_a": trial_a, "trial_b": trial_b, "answer": new.answer, "author": author });
+    let detail = json!({
+        "study": study.id, "trial_a": trial_a, "trial_b": trial_b, "answer": new.answer, "author": author,
+        "replaces": replaces,
+    });
     audit::append(writer, &caller.actor, "assessment.give", &format!("assessment {id}"), &detail).await?;
     Ok(id)
 }
@@ -72,12 +87,10 @@ pub async fn give(
 /// As [`feedback_log::record`].
 pub(super) async fn write(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<AssessmentId, Error> {
     let feedback_id = feedback_log::record(writer, statement).await?;
-    let AttributedAnswer { study, pair, answer, attribution, .. } = statement;
-    let id = assessments::insert(
-        writer,
-        &assessments::UnsavedAssessment { study, pair, answer: answer.try_into()?, attribution, feedback: feedback_id },
-    )
-    .await?;
+    let AttributedAnswer { study, pair, answer, attribution, replaces, .. } = statement;
+    let (answer, origin) = (answer.try_into()?, Origin::replacing(replaces));
+    let new = assessments::UnsavedAssessment { study, pair, answer, attribution, feedback: feedback_id, origin };
+    let id = assessments::insert(writer, &new).await?;
     events::append(writer, study, "feedback_given", &json!({ "feedback_id": feedback_id, "assessment_id": id }))
         .await?;
     Ok(id)

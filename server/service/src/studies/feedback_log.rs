@@ -8,9 +8,11 @@ use crate::error::Error;
 use crate::printable;
 use gait_learner::ActionIndex;
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
-use gaitwright_store::feedback::{self, Attribution, FeedbackContent, Source};
+use gaitwright_store::feedback::{self, Attribution, FeedbackContent, FeedbackRow, Origin, Source};
 use gaitwright_store::trials::{Label, Trial, TrialState};
-use gaitwright_store::{BlindPairId, Connection, FeedbackId, StudyId, TrialId, Writer, assessments, authors, trials};
+use gaitwright_store::{
+    AnswerId, BlindPairId, Connection, FeedbackId, StudyId, TrialId, Writer, assessments, authors, trials,
+};
 use serde_json::Value;
 
 /// The author of computed answers.
@@ -40,6 +42,8 @@ pub struct AttributedAnswer<'a> {
     pub attribution: Attribution<'a>,
     /// Whether the author may have answered before.
     pub second_answer: SecondAnswer,
+    /// The answer in whose place it is given, which no longer counts.
+    pub replaces: Option<AnswerId>,
 }
 
 /// Checks an answer and passes it to the learner. Returns `None` if it states no preference.
@@ -52,7 +56,7 @@ pub struct AttributedAnswer<'a> {
 /// [`Error::NotFound`], [`Error::Invalid`] naming the field, [`Error::Conflict`] after withdrawal of consent or for a
 /// second answer.
 pub async fn record(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<Option<FeedbackId>, Error> {
-    let AttributedAnswer { study, pair, fields, answer, attribution, second_answer } = statement;
+    let AttributedAnswer { study, pair, fields, answer, attribution, second_answer, replaces } = statement;
     if !matches!(attribution.source, Source::Subject | Source::Clinician | Source::Script) {
         return Err(Error::invalid("source", attribution.source.as_str(), "subject, clinician or script"));
     }
@@ -69,7 +73,9 @@ pub async fn record(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Res
         before.map_or(Ok(()), |_| Err(answered_before(attribution.author)))?;
     }
     match answer.feedback(pair.trials()) {
-        Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
+        Some(content) => {
+            Ok(Some(feedback::append(writer, study, &content, attribution, Origin::replacing(replaces)).await?))
+        }
         None => Ok(None),
     }
 }
@@ -86,7 +92,8 @@ async fn report_unsafe(writer: &mut Writer, statement: AttributedAnswer<'_>) -> 
     let neither_is_reported = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbids(trial));
     let preference = answer.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
     match preference {
-        Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution).await?)),
+        // The assessment itself names the answer that it replaces.
+        Some(content) => Ok(Some(feedback::append(writer, study, &content, attribution, Origin::New).await?)),
         None => Ok(None),
     }
 }
@@ -221,7 +228,16 @@ pub(super) async fn suggest(
         )));
     }
     let content = FeedbackContent::Suggestion { suggested, over: over.id };
-    Ok(feedback::append(writer, study, &content, attribution).await?)
+    Ok(feedback::append(writer, study, &content, attribution, Origin::New).await?)
+}
+
+/// Brings a preference back whose change was undone, with its content and its author.
+///
+/// # Errors
+/// A violated constraint if it was brought back before; errors of the database.
+pub(super) async fn restore(writer: &mut Writer, row: &FeedbackRow) -> Result<FeedbackId, Error> {
+    let attribution = Attribution { source: row.source, author: &row.author, note: &row.note };
+    Ok(feedback::append(writer, row.study_id, &row.content, attribution, Origin::Restores(row.id)).await?)
 }
 
 /// Tells the learner the result of a trial, and the preferences that Gait RMSE implies.
@@ -237,9 +253,9 @@ pub(super) async fn compute(
 ) -> Result<(), Error> {
     let attribution = |source| Attribution { source, author, note: "" };
     let label = FeedbackContent::Label { trial, label };
-    feedback::append(writer, study, &label, attribution(Source::Evaluation)).await?;
+    feedback::append(writer, study, &label, attribution(Source::Evaluation), Origin::New).await?;
     for answer in answers {
-        feedback::append(writer, study, answer, attribution(Source::GaitRmse)).await?;
+        feedback::append(writer, study, answer, attribution(Source::GaitRmse), Origin::New).await?;
     }
     Ok(())
 }

@@ -110,6 +110,8 @@ pub(super) fn likely_next(pool: &OnPool, snapshot: &StudySnapshot) -> Result<Vec
             note: String::new(),
             by_rater: false,
             could_have_known: false,
+            replaces: None,
+            restores: None,
             created_at: now(),
             retraction: None,
         });

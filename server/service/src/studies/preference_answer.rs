@@ -3,14 +3,17 @@
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::feedback_log::{self, AttributedAnswer};
+use crate::studies::recorded_answer;
 use crate::studies::trial_transitions::has_state;
 use crate::studies::walkable;
 use gaitwright_store::audit;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies};
+use gaitwright_store::{
+    AnswerId, Connection, FeedbackId, StudyId, TrialId, Writer, consents, events, feedback, studies,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -62,6 +65,10 @@ pub struct Answer {
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub note: String,
+    /// Identifier of the preference or assessment that this answer replaces: an answer of a person about the same two
+    /// trials, which no longer counts. If this answer is undone, the replaced one counts again.
+    #[serde(default)]
+    pub replaces: Option<AnswerId>,
 }
 
 /// Records a preference.
@@ -84,13 +91,17 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
         fields,
         answer: ordered,
         attribution,
-        second_answer: SecondAnswer::Refused,
+        second_answer: recorded_answer::replace(writer, (study.id, (a, b)), answer.replaces, attribution.author)
+            .await?,
+        replaces: answer.replaces,
     };
     let feedback_id = feedback_log::record(writer, statement).await?;
     let id = feedback_id.ok_or_else(|| Error::Internal("a preference did not reach the learner".to_owned()))?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
-    let detail =
-        json!({ "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": attribution.author });
+    let detail = json!({
+        "study": study.id, "trial_a": a, "trial_b": b, "answer": answer.answer, "author": attribution.author,
+        "replaces": answer.replaces,
+    });
     audit::append(writer, &caller.actor, "preference.give", &format!("preference {id}"), &detail).await?;
     Ok(id)
 }

@@ -2,11 +2,11 @@
 
 use super::snapshot::{StudySnapshot, is_answer_of_a_person};
 use gait_learner::{FeedbackLog, Learner, LearnerError, Posterior, Prediction};
-use gaitwright_store::TrialId;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
 use gaitwright_store::safety_reviews::SafetyVersion;
 use gaitwright_store::trials::{Trial, TrialState};
-use std::collections::HashSet;
+use gaitwright_store::{FeedbackId, TrialId};
+use std::collections::{HashMap, HashSet};
 
 /// Largest number of points: each one costs a fit of all answers before it.
 const MOST_POINTS: usize = 64;
@@ -38,7 +38,7 @@ pub(super) struct UtilityHistory {
 impl UtilityHistory {
     /// The points of a snapshot. A point is computed again only if an entry before it was added or retracted.
     pub(super) fn of(&mut self, snapshot: &StudySnapshot) -> Result<Vec<UtilityPoint>, LearnerError> {
-        let rows: Vec<&FeedbackRow> = snapshot.feedback.iter().filter(|row| counts(row)).collect();
+        let rows = in_order(&snapshot.feedback);
         let entries: Vec<i64> = rows.iter().map(|row| row.seq).collect();
         let unchanged = entries.iter().zip(&self.entries).take_while(|(new, old)| new == old).count();
         if self.safety != Some(snapshot.safety) {
@@ -59,6 +59,19 @@ impl UtilityHistory {
         self.points = points;
         Ok(self.points.iter().map(|(_, point)| *point).collect())
     }
+}
+
+/// The entries that the learner observes, in the order in which they were first given: an answer that undo brought back
+/// has the place of the original.
+fn in_order(feedback: &[FeedbackRow]) -> Vec<&FeedbackRow> {
+    let mut places: HashMap<FeedbackId, i64> = HashMap::new();
+    for row in feedback {
+        let place = row.restores.and_then(|original| places.get(&original).copied()).unwrap_or(row.seq);
+        places.insert(row.id, place);
+    }
+    let mut rows: Vec<&FeedbackRow> = feedback.iter().filter(|row| counts(row)).collect();
+    rows.sort_by_key(|row| places.get(&row.id).copied().unwrap_or(row.seq));
+    rows
 }
 
 /// Whether the learner observes an entry. A label stays even if it were retracted: its trial was visited.

@@ -1,11 +1,13 @@
 //! The feedback log: labels, preferences and suggestions for the learner, append-only.
 
 mod content;
+mod origin;
 
 pub use content::{FeedbackContent, Source};
+pub use origin::Origin;
 
 use super::many_rows::read_many;
-use super::{Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
+use super::{AnswerId, Connection, FeedbackId, Instant, StoreError, StoreResult, StudyId, TrialId, now};
 use gait_learner::ActionIndex;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{AssertSqlSafe, Row};
@@ -31,6 +33,10 @@ pub struct FeedbackRow {
     pub by_rater: bool,
     /// Whether the rater could have known the allocation. If so, the entry does not count as blind.
     pub could_have_known: bool,
+    /// The answer in whose place it was given.
+    pub replaces: Option<AnswerId>,
+    /// The preference that it brings back, because the change to another answer was undone.
+    pub restores: Option<FeedbackId>,
     /// Time of recording.
     pub created_at: Instant,
     /// Retraction, if it was retracted.
@@ -79,6 +85,7 @@ pub async fn append(
     study: StudyId,
     content: &FeedbackContent,
     attribution: Attribution<'_>,
+    origin: Origin<FeedbackId>,
 ) -> StoreResult<FeedbackId> {
     let id = FeedbackId::fresh();
     let (kind, a, b, label, suggested) = match *content {
@@ -91,7 +98,7 @@ pub async fn append(
     };
     sqlx::query(
         "insert into feedback (id, study_id, kind, trial_a, trial_b, label, suggested, source, author, note, \
-         created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         replaces, restores, created_at) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(study)
@@ -103,6 +110,8 @@ pub async fn append(
     .bind(attribution.source.as_str())
     .bind(attribution.author)
     .bind(attribution.note)
+    .bind(origin.replaces())
+    .bind(origin.restores())
     .bind(now())
     .execute(db)
     .await?;
@@ -140,16 +149,29 @@ fn select(rest: &str) -> AssertSqlSafe<String> {
     AssertSqlSafe(format!("{SELECT} {rest}"))
 }
 
+/// The row with this identifier, if there is one.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn find(db: &mut Connection, id: FeedbackId) -> StoreResult<Option<FeedbackRow>> {
+    let row = sqlx::query(select("where f.id = ?")).bind(id).fetch_optional(db).await?;
+    row.as_ref().map(from_row).transpose()
+}
+
 /// The row with this identifier.
 ///
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
 pub async fn get(db: &mut Connection, id: FeedbackId) -> StoreResult<FeedbackRow> {
-    let row = sqlx::query(select("where f.id = ?")).bind(id).fetch_optional(db).await?;
-    row.as_ref()
-        .map(from_row)
-        .transpose()?
-        .ok_or_else(|| StoreError::Missing { what: "preference", id: id.to_string() })
+    find(db, id).await?.ok_or_else(|| StoreError::Missing { what: "preference", id: id.to_string() })
+}
+
+/// The entry that brings a preference back.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn restoration(db: &mut Connection, id: FeedbackId) -> StoreResult<Option<FeedbackId>> {
+    Ok(sqlx::query_scalar("select id from feedback where restores = ?").bind(id).fetch_optional(db).await?)
 }
 
 /// The entries of a study after a sequence number, retracted ones included, in order.
@@ -342,6 +364,8 @@ fn from_row(row: &SqliteRow) -> StoreResult<FeedbackRow> {
         note: row.try_get("note")?,
         by_rater: row.try_get("by_rater")?,
         could_have_known: row.try_get("could_have_known")?,
+        replaces: row.try_get("replaces")?,
+        restores: row.try_get("restores")?,
         created_at: row.try_get("created_at")?,
         retraction: Retraction::from_row(row)?,
     })

@@ -10,6 +10,7 @@ from typing import Optional, cast
 from ..paging import Pages
 from ..schemas import (
     AnswerRetraction,
+    AnswerUndo,
     Assessment,
     AssessmentId,
     CreatedPreference,
@@ -19,6 +20,7 @@ from ..schemas import (
     NewSafetyReport,
     NewSafetyReview,
     Preference,
+    RestoredAnswer,
     SafetyReport,
     SafetyReview,
     StudyId,
@@ -60,6 +62,30 @@ class PreferencesMethods(Transport):
             ),
         )
 
+    def undo_assessment(
+        self,
+        assessment_id: AssessmentId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[AnswerUndo],
+    ) -> RestoredAnswer:
+        """Undo an assessment.
+
+        As for a preference. A safety report cannot be undone.
+
+        Fields: optionally author.
+        """
+        return cast(
+            RestoredAnswer,
+            self.request_json(
+                "POST",
+                "/api/v1/assessments/{id}/undo",
+                {"id": assessment_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
     def get_preference(self, preference_id: FeedbackId) -> Preference:
         """Get a preference."""
         return cast(Preference, self.request_json("GET", "/api/v1/preferences/{id}", {"id": preference_id}))
@@ -73,7 +99,8 @@ class PreferencesMethods(Transport):
     ) -> Preference:
         """Retract a preference.
 
-        The preference stays on record, but the learner no longer uses it.
+        The preference stays on record, but the learner no longer uses it. An answer that it replaced does not count
+        again: for that, undo it.
 
         Fields: reason; optionally author.
         """
@@ -82,6 +109,31 @@ class PreferencesMethods(Transport):
             self.request_json(
                 "POST",
                 "/api/v1/preferences/{id}/retract",
+                {"id": preference_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def undo_preference(
+        self,
+        preference_id: FeedbackId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[AnswerUndo],
+    ) -> RestoredAnswer:
+        """Undo a preference.
+
+        Retracts a preference that was recorded in the last two minutes. If it replaced an answer, a copy of that answer
+        with the same author is recorded, and counts in its place. An undo cannot be undone.
+
+        Fields: optionally author.
+        """
+        return cast(
+            RestoredAnswer,
+            self.request_json(
+                "POST",
+                "/api/v1/preferences/{id}/undo",
                 {"id": preference_id},
                 body=body,
                 key=idempotency_key,
@@ -107,7 +159,7 @@ class PreferencesMethods(Transport):
         States that the author cannot tell which gait is better, or that a gait is unsafe. An unsafe gait is not
         recommended, compared or planned for lab sessions until staff have cleared the gait.
 
-        Fields: answer, trial_a, trial_b; optionally author, note, source.
+        Fields: answer, trial_a, trial_b; optionally author, note, replaces, source.
         """
         return cast(
             Assessment,
@@ -137,9 +189,9 @@ class PreferencesMethods(Transport):
         """Create a preference.
 
         Records which of two gaits is better, or that there is no difference. Both gaits must be walkable. An author can
-        give only one answer per pair of gaits; to change an answer, retract it first.
+        give only one answer per pair of gaits; to change an answer, name it in `replaces`.
 
-        Fields: answer, trial_a, trial_b; optionally author, note, source.
+        Fields: answer, trial_a, trial_b; optionally author, note, replaces, source.
         """
         return cast(
             CreatedPreference,

@@ -3,9 +3,9 @@
 use crate::format;
 use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReportSource};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::Instant;
 use gaitwright_store::assessments::{Assessment, AssessmentAnswer};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Retraction, Source};
+use gaitwright_store::{AnswerId, Instant};
 use std::cmp::Reverse;
 
 /// An answer.
@@ -17,7 +17,9 @@ pub(super) struct AnswerRow {
     /// Why it no longer counts.
     pub(super) undone: Option<String>,
     /// `change` of the comparison page that can change it.
-    pub(super) saved: Option<String>,
+    pub(super) saved: Option<AnswerId>,
+    /// Whether it counts again because a change to it was undone.
+    pub(super) restored: bool,
     pub(super) at: Instant,
 }
 
@@ -37,7 +39,8 @@ pub(super) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> V
             by: format!("{}, {}", format::source(row), row.author),
             note: row.note.clone(),
             undone: why(&row.retraction),
-            saved: (row.retraction.is_none() && !row.by_rater).then(|| row.id.to_string()),
+            saved: (row.retraction.is_none() && !row.by_rater).then(|| row.id.into()),
+            restored: row.restores.is_some(),
             at: row.created_at,
         })
     };
@@ -48,7 +51,8 @@ pub(super) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> V
             note: assessment.note.clone(),
             undone: why(&assessment.retraction).or_else(|| cleared(assessment.id)),
             saved: (assessment.retraction.is_none() && !assessment.answer.is_about_safety())
-                .then(|| format!("assessment-{}", assessment.id)),
+                .then(|| assessment.id.into()),
+            restored: assessment.restores.is_some(),
             at: assessment.created_at,
         })
     };

@@ -9,7 +9,7 @@ use gaitwright_store::members::MemberKind;
 use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::Label;
-use gaitwright_store::{EmgResultId, Instant, MeasurementFileId, MemberId, SessionId, StudyId, TrialId};
+use gaitwright_store::{AnswerId, EmgResultId, Instant, MeasurementFileId, MemberId, SessionId, StudyId, TrialId};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
@@ -29,7 +29,7 @@ pub(crate) struct AuditDetail {
     /// `study.change`: whether the study is archived.
     #[schema(required = false)]
     archived: bool,
-    /// Author of the answer, report, review or retraction.
+    /// Author of the answer, report, review, retraction or undo.
     #[schema(required = false)]
     author: String,
     /// Values before the change: `study.change`, `subject.correct`, `user.role`.
@@ -150,6 +150,10 @@ pub(crate) struct AuditDetail {
     /// Whether only members see the study: `study.create`, `study.restrict`.
     #[schema(required = false)]
     restricted: bool,
+    /// `preference.give`, `assessment.give`: the answer that it replaced. Null if it replaced none.
+    replaces: Option<AnswerId>,
+    /// `preference.undo`, `assessment.undo`: the new entry of the answer that counts again. Null if there is none.
+    restored: Option<AnswerId>,
     /// `lab_session.process`: the processed EMG.
     #[schema(required = false)]
     result: EmgResultId,

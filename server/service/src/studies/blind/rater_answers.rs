@@ -208,7 +208,8 @@ pub async fn answer(
     }
     let second_answer = if shown.kind == BlindPairKind::Repeat { SecondAnswer::Allowed } else { SecondAnswer::Refused };
     let (study, pair, fields) = (shown.study_id, shown.trials(), ("first", "second"));
-    let statement = AttributedAnswer { study, pair, fields, answer, attribution, second_answer };
+    // A pair has one answer, and a repeat replaces nothing: both answers count.
+    let statement = AttributedAnswer { study, pair, fields, answer, attribution, second_answer, replaces: None };
     let feedback_id = feedback_log::record(writer, statement).await.map_err(without_gaits)?;
     let could_have_known = could_have_known(writer, caller, shown.study_id).await?;
     let row = NewPairAnswer {

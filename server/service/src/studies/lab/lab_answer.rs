@@ -187,6 +187,7 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
         attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
         // Several sessions may compare the same two gaits.
         second_answer: SecondAnswer::Allowed,
+        replaces: None,
     };
     let feedback_id = if given.answer.is_assessment() {
         assessment::write(writer, statement).await.map(drop)

@@ -1,6 +1,7 @@
 //! Checks the answers in an imported archive: each against its trials, and how often a person answered.
 
 use super::super::archive_file::refuse;
+use super::answer_changes::answer_changes;
 use super::context::{at, of_gaits};
 use crate::error::Error;
 use crate::printable;
@@ -62,6 +63,7 @@ pub(super) async fn answers(
             return Err(refuse(format!("{what}: the preference derived from it is about other trials")));
         }
     }
+    answer_changes(&rows, &assessments)?;
     let mut reports: HashSet<SafetyReportId> = HashSet::new();
     reports.extend(
         assessments.iter().filter(|assessment| assessment.answer.is_about_safety()).map(|a| SafetyReportId::from(a.id)),

@@ -1,6 +1,7 @@
 //! Checks an imported archive: every value by the rules that apply when people enter it, and every derived figure by
 //! computing it again.
 
+mod answer_changes;
 mod answers;
 mod context;
 mod trial_results;
