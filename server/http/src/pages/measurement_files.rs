@@ -1,6 +1,6 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
-use super::lab;
+use super::lab_sessions;
 use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields, PreviewedEmg};
 use super::recording_preview::RecordingPreview;
 use crate::AppState;
@@ -36,7 +36,8 @@ pub(super) async fn emg(
         keep(&app, &authorized, id, checked).await
     };
     let kept = kept.await;
-    lab::answer(&mut app, id, &authorized.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() }).await
+    lab_sessions::answer(&mut app, id, &authorized.caller, kept, Forms { emg: fields, open: "emg", ..Forms::default() })
+        .await
 }
 
 /// `POST /lab-sessions/{id}/measurement-files/joint-angles`.
@@ -56,7 +57,7 @@ pub(super) async fn joint_angles(
         keep(&app, &authorized, id, checked).await
     };
     let kept = kept.await;
-    lab::answer(
+    lab_sessions::answer(
         &mut app,
         id,
         &authorized.caller,
@@ -83,7 +84,7 @@ async fn show_preview(
     refused: Option<String>,
 ) -> Result<Response, PageError> {
     let status = if refused.is_some() { StatusCode::UNPROCESSABLE_ENTITY } else { StatusCode::OK };
-    Ok((status, lab::show(app, id, &authorized.caller, forms, refused).await?).into_response())
+    Ok((status, lab_sessions::show(app, id, &authorized.caller, forms, refused).await?).into_response())
 }
 
 /// Reads and draws the file of the form on the thread pool. Nothing is stored.
@@ -129,5 +130,5 @@ pub(super) async fn process(
     };
     let processed = processed.await;
     let forms = Forms { filters: Some(typed), open: "filters", ..Forms::default() };
-    lab::answer(&mut app, id, &authorized.caller, processed, forms).await
+    lab_sessions::answer(&mut app, id, &authorized.caller, processed, forms).await
 }

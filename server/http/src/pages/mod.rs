@@ -19,8 +19,8 @@ mod help;
 mod home;
 mod jobs;
 mod joint_peaks;
-mod lab;
-mod lab_walk;
+mod lab_sessions;
+mod lab_tablet;
 mod measurement_files;
 mod measurement_forms;
 mod members;
@@ -95,17 +95,17 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{code}", get(rate::pair).post(rate::answer))
         .route("/rate/pair/{code}/retract", post(rate::retract))
-        .route("/studies/{id}/lab", get(lab::list).post(lab::plan))
-        .route("/lab-sessions/{id}", get(lab::get))
-        .route("/lab-sessions/{id}/close", post(lab::close))
-        .route("/lab-sessions/{id}/unblind", post(lab::unblind))
+        .route("/studies/{id}/lab", get(lab_sessions::list).post(lab_sessions::plan))
+        .route("/lab-sessions/{id}", get(lab_sessions::get))
+        .route("/lab-sessions/{id}/close", post(lab_sessions::close))
+        .route("/lab-sessions/{id}/unblind", post(lab_sessions::unblind))
         .route("/lab-sessions/{id}/measurement-files/emg", post(measurement_files::emg))
         .route("/lab-sessions/{id}/measurement-files/joint-angles", post(measurement_files::joint_angles))
         .route("/lab-sessions/{id}/process", post(measurement_files::process))
-        .route("/lab", get(lab_walk::list))
-        .route("/lab/{id}", get(lab_walk::get).post(lab_walk::record))
-        .route("/lab/{id}/answer", post(lab_walk::answer))
-        .route("/lab/{id}/retract", post(lab_walk::retract))
+        .route("/lab", get(lab_tablet::list))
+        .route("/lab/{id}", get(lab_tablet::get).post(lab_tablet::record))
+        .route("/lab/{id}/answer", post(lab_tablet::answer))
+        .route("/lab/{id}/retract", post(lab_tablet::retract))
         .route("/jobs/{id}/cancel", post(jobs::cancel))
         .route("/units", post(unit_choice::post))
         .route("/users", get(users::get).post(users::post))

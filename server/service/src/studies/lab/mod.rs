@@ -10,11 +10,11 @@ mod emg_preview;
 mod emg_reading;
 mod file_format;
 mod joint_angle_preview;
-mod lab_answer;
 mod measurement_results;
 mod question;
 mod session;
 mod session_view;
+mod subject_answer;
 mod unblinding;
 mod upload;
 
@@ -24,7 +24,6 @@ pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use emg_reading::EmgReading;
 pub use file_format::MeasurementFormat;
 pub use joint_angle_preview::JointAnglePreview;
-pub use lab_answer::{NewAnswer, give as answer, retract};
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
     with_model,
@@ -35,6 +34,7 @@ pub use session::{
     record_walk, session_progress, still_open, was_recorded,
 };
 pub use session_view::{LabSessionState, LabSessionView, WalkCondition, WalkView};
+pub use subject_answer::{NewAnswer, give as answer, retract};
 pub use unblinding::unblind;
 pub use upload::{
     CheckedFile, JointAngleReading, NewEmg, NewJointAngles, UploadedFile, check_kept, read_upload, store_upload,

@@ -5,20 +5,18 @@
 
 use super::question::{can_be_retracted, next_number, next_walk};
 use super::session::{LabSessionProgress, session_progress, still_open, still_shown};
+use super::unblinding;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::assessment;
-use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::preference_answer as answering;
 use crate::studies::safety_report;
 use crate::studies::safety_reports::SafetyReports;
-use gaitwright_store::audit::Actor;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};
 use gaitwright_store::lab_sessions::{LabSession, SessionStep};
-use gaitwright_store::{LabSessionId, Writer, audit, events, lab_sessions, studies, subjects};
+use gaitwright_store::{LabSessionId, Writer, audit, events, lab_sessions};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -141,7 +139,7 @@ async fn add(
     }
     let session = lab_sessions::get(writer, id).await?;
     if session.done(SessionStep::Unblinded).is_some() {
-        record_answer(writer, &session).await?;
+        unblinding::record_answer(writer, &session).await?;
     }
     let detail = json!({ "number": number, "answer": new.answer, "note": new.note });
     audit::append(writer, &caller.actor, "lab_session.answer", &format!("lab session {id}"), &detail).await?;
@@ -171,40 +169,4 @@ async fn retract_number(writer: &mut Writer, caller: &Caller, id: LabSessionId, 
     lab_answers::retract(writer, &caller.actor, id, number).await?;
     let detail = json!({ "number": number });
     Ok(audit::append(writer, &caller.actor, "lab_session.retract", &format!("lab session {id}"), &detail).await?)
-}
-
-/// Passes the current answer, if any, to the learner with the subject as its author. If a gait has been reported as
-/// unsafe since the answer, the answer stays on record but does not reach the learner.
-pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> Result<(), Error> {
-    let (Some(given), Some(walked)) = (session.answer(), session.walked()) else { return Ok(()) };
-    let study = studies::get(writer, session.study_id).await?;
-    let author = subjects::get(writer, study.plan.subject_id).await?.pseudonym;
-    let statement = AttributedAnswer {
-        study: study.id,
-        pair: walked,
-        fields: ("walk 2", "walk 3"),
-        answer: given.answer,
-        attribution: Attribution { source: Source::Subject, author: &author, note: &given.note },
-        // Several sessions may compare the same two gaits.
-        second_answer: SecondAnswer::Allowed,
-        replaces: None,
-    };
-    let feedback_id = if given.answer.is_assessment() {
-        assessment::write(writer, statement).await.map(drop)
-    } else {
-        record_preference(writer, statement).await
-    };
-    match feedback_id {
-        Err(reason @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let detail = json!({ "number": given.number, "reason": reason.to_string() });
-            let object = format!("lab session {}", session.id);
-            Ok(audit::append(writer, &Actor::program(), "lab_session.answer_not_used", &object, &detail).await?)
-        }
-        other => other,
-    }
-}
-
-async fn record_preference(writer: &mut Writer, statement: AttributedAnswer<'_>) -> Result<(), Error> {
-    let feedback_id = feedback_log::record(writer, statement).await?;
-    Ok(events::append(writer, statement.study, "feedback_given", &json!({ "feedback_id": feedback_id })).await?)
 }
