@@ -3,7 +3,7 @@
 //! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, lab session,
 //! comparison and recommendation takes one, so code that skips the rules does not compile.
 
-use super::safety_reports::SafetyReports;
+use super::reported_gaits::SafetyReports;
 use super::same_motion::is_same_gait;
 use super::trial_transitions::has_state;
 use crate::error::Error;

@@ -23,7 +23,7 @@ use gaitwright_service::studies::certified_best::{self, BestCertification, Certi
 use gaitwright_service::studies::equal_actions::never_active;
 use gaitwright_service::studies::execution;
 use gaitwright_service::studies::lifecycle::{self, StudyTransition, transitions_for_people};
-use gaitwright_service::studies::safety_reports::ReportedGait;
+use gaitwright_service::studies::reported_gaits::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::workers::Track;
 use gaitwright_store::studies::{AnswerSource, Study, StudyState};

@@ -10,9 +10,9 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::assessment;
 use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::new_safety_report;
 use crate::studies::preference_answer as answering;
-use crate::studies::safety_report;
-use crate::studies::safety_reports::SafetyReports;
+use crate::studies::reported_gaits::SafetyReports;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, Source};
@@ -123,7 +123,7 @@ async fn report_unsafe(
             // At most 80 characters, as every author.
             let author = format!("the subject in lab session {} ({walks}{blinded})", session.number);
             let attribution = Attribution { source: Source::Subject, author: &author, note: &new.note };
-            safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
+            new_safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
             session_progress(writer, session.id).await
         }
     }
