@@ -15,6 +15,7 @@ mod body_measures;
 mod client_address;
 pub mod connections;
 mod csv_response;
+mod described_parameters;
 mod entity_tag;
 mod extractors;
 mod figures;

@@ -28,7 +28,7 @@ pub(super) async fn list(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
-    paging: Paging<usize>,
+    paging: Paging<u8>,
 ) -> Result<Json<Page<LimitCycles>>, Refusal> {
-    Ok(Json(paging.cut_by_place(lab::limit_cycles(app.store_mut(), id).await?)?.map(LimitCycles::from)))
+    Ok(Json(paging.cut(lab::limit_cycles(app.store_mut(), id).await?, |of| of.walk)?.map(LimitCycles::from)))
 }
