@@ -14,8 +14,8 @@ use crate::settings::LearnerSettings;
 use crate::special_functions;
 
 pub(crate) mod agreement;
-pub(crate) mod best_action;
 pub(crate) mod convergence_probability;
+pub(crate) mod main_effects;
 pub(crate) mod marginals;
 pub(crate) mod preference_probability;
 #[cfg(test)]

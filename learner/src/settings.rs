@@ -250,14 +250,18 @@ impl LearnerSettings {
         }
         let narrowest = 1e-3 * deviation;
         if let Some([below, above]) = self.ordinal_thresholds.array_windows().find(|[a, b]| b - a < narrowest) {
-            let reason =
-                format!("has {above} after {below}; each must exceed the previous one by at least {narrowest}");
+            let reason = format!(
+                "has {above} after {below}; it must be a list whose values increase in steps of at least {narrowest}"
+            );
             return refuse("ordinal_thresholds", reason);
         }
         if self.ordinal_thresholds.len() > 100 {
             return refuse(
                 "ordinal_thresholds",
-                format!("has {} thresholds; it must have at most 100", self.ordinal_thresholds.len()),
+                format!(
+                    "has {} thresholds; it must be a list of at most 100 thresholds",
+                    self.ordinal_thresholds.len()
+                ),
             );
         }
         if !(1..=1024).contains(&self.samples_per_iteration) {

@@ -135,8 +135,6 @@ proptest! {
             propose(&space, &log, &[], &settings, 1).map(drop),
             propose_batch(&space, &log, &[], &settings, 1).map(drop),
             proposed_comparison(&space, &log, &settings).map(drop),
-            posterior.best_of_visited(5, 1).map(drop),
-            posterior.best_of_grid(2, 1).map(drop),
         ] {
             match result {
                 Ok(()) | Err(LearnerError::Exhausted { .. }) => {}

@@ -1,4 +1,4 @@
-//! The four default cold starts: results, attempts, and the gap to the golden objectives.
+//! The four default cold starts: results, runs, and the gap to the golden objectives.
 //!
 //! `cargo run --release -p gait-optimizer --example default_solves -- [-n | -m] [-v] [--threads 2] [--reference-problem]`;
 //! `-n` without muscles only, `-m` with muscles only, `-v` prints every iteration to stderr. The golden objectives
@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             r.seconds_linear_algebra,
             r.speed_m_s
         );
-        for a in &r.attempts {
+        for a in &r.solver_runs {
             println!(
                 "   {}{}: {:?}, {} iterations, {:.2} s, objective {:.8}, Gait RMSE {:.4}",
                 if a.chosen { "* " } else { "  " },

@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for pair in guesses.chunks(threads) {
             let options = SolveOptions { threads, max_iterations: 500, ..SolveOptions::default() };
             let outcome = solve_from_guesses(&problem, pair, &options, &mut |_| {}, &CancelToken::new())?;
-            for a in outcome.report.attempts {
+            for a in outcome.report.solver_runs {
                 println!(
                     "{subject},\"{}\",{:?},{},{:.2},{:.8},{:.4}",
                     a.strategy, a.status, a.iterations, a.seconds, a.objective, a.gait_rmse_rad

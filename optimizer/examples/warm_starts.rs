@@ -7,7 +7,7 @@
 //! `--active on` draws only values with which the gait would not stay as it is. With `--starts 25`, the changes are spread
 //! over as many gaits, of random actions of Table I, solved from the gait of `--from`.
 //!
-//! `warm_attempt` is the end of the warm start itself. `violation_stands` is its longest run of iterations in which the
+//! `warm_run` is the end of the warm start itself. `violation_stands` is its longest run of iterations in which the
 //! smallest violation did not decrease to 0.9 times its value; `residuals_stand` is the same for the largest of
 //! violation, dual infeasibility and barrier parameter, with 0.5.
 
@@ -128,7 +128,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         root.report.status, root.report.iterations, root.report.seconds_total
     );
     println!(
-        "change,warm_attempt,warm_attempt_iterations,violation_stands,residuals_stand,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse"
+        "change,warm_run,warm_run_iterations,violation_stands,residuals_stand,warm_status,warm_from,warm_iterations,warm_seconds,warm_objective,warm_rmse,cold_status,cold_iterations,cold_seconds,cold_objective,cold_rmse"
     );
     let (mut warm_seconds, mut warm_iterations) = (Vec::new(), Vec::new());
     let (mut cold_seconds, mut cold_iterations) = (Vec::new(), Vec::new());
@@ -157,12 +157,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         })?
         .report;
-        let attempt = warm.attempts.first().ok_or("a solve without attempts")?;
-        failed += usize::from(attempt.status != SolveStatus::Converged);
+        let solver_run = warm.solver_runs.first().ok_or("a solve without runs")?;
+        failed += usize::from(solver_run.status != SolveStatus::Converged);
         print!(
             "{words},{:?},{},{},{},{:?},{:?},{},{:.3},{:.8},{:.4}",
-            attempt.status,
-            attempt.iterations,
+            solver_run.status,
+            solver_run.iterations,
             longest_stand(&iterations, 0.9, |r| r.constraint_violation),
             longest_stand(&iterations, 0.5, |r| r.constraint_violation.max(r.dual_infeasibility).max(r.barrier)),
             warm.status,

@@ -18,14 +18,16 @@
 mod check;
 mod closed_loop;
 mod contact_kinematics;
-mod domain_differences;
+mod differences_from_defaults;
 mod dormand_prince;
 mod feedback_linearization;
 mod findings;
+mod finite_differences;
 mod guard;
 mod hybrid_walker;
 mod identity;
 mod limit_excess;
+mod limits;
 mod muscle_residuals;
 mod poincare_section;
 mod push;
@@ -41,8 +43,9 @@ mod simulation_tests;
 
 pub use check::Check;
 pub use closed_loop::STRIDES;
+pub use differences_from_defaults::Difference;
 pub use hybrid_walker::Fall;
-pub use identity::{CertifiedGait, Difference};
+pub use identity::CertifiedGait;
 pub use push::{LARGEST_PUSH_M_S, Pushes, RECOVERY_STRIDES};
 pub use return_map::{FloquetMultiplier, ReturnMap};
 

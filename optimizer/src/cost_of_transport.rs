@@ -2,7 +2,7 @@
 
 use crate::body::{GRAVITY, JOINTS};
 use crate::gait::Gait;
-use crate::gait::motion::instant;
+use crate::gait::between_nodes::instant;
 
 /// Parts of the time between two nodes for the integral of the joint powers, whose magnitudes have kinks.
 const POWER_SAMPLES: usize = 32;

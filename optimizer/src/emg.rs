@@ -9,14 +9,16 @@ mod activity;
 mod cycle_activity;
 mod emg_filter;
 mod emg_recording;
+mod emg_rmse;
 mod envelope;
 mod filter_settings;
 mod model_activity;
 mod raw_signal_checks;
 
 pub use activity::Activity;
-pub use cycle_activity::{CYCLE_POINTS, CycleActivity, EmgRmse, emg_rmse, is_plausible, strides_between};
+pub use cycle_activity::{CYCLE_POINTS, CycleActivity};
 pub use emg_recording::EmgRecording;
+pub use emg_rmse::{EmgRmse, emg_rmse};
 pub use envelope::Envelope;
 pub use filter_settings::EmgSettings;
 pub use model_activity::{ModelActivity, model_activity};

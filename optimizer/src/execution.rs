@@ -10,15 +10,15 @@
 
 mod actuator;
 mod control_period;
-mod disturbance;
 mod execution_report;
 mod foot_contact;
 mod gains;
 mod ground;
-mod human;
+mod human_joints;
 mod planned_stride;
 mod plant;
 mod prosthesis;
+mod random_disturbances;
 mod random_stream;
 mod report_sentence;
 mod sensors;
@@ -35,7 +35,7 @@ pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYie
 use crate::cancel_token::CancelToken;
 use crate::gait::Gait;
 use crate::model_error::ModelError;
-use disturbance::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
+use random_disturbances::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
 use serde::{Deserialize, Serialize};
 use simulated_walk::{SimulatedWalker, WalkEnd, WalkOutcome};
 use std::sync::atomic::{AtomicU32, Ordering};

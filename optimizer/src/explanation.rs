@@ -226,7 +226,7 @@ fn search_into(
     let program = problem.program(problem.muscles)?;
     let x = &last.point.x;
     if x.len() != program.variables() {
-        let sizes = format!("{} variables, expected {}", x.len(), program.variables());
+        let sizes = format!("it has {} variables; the problem has {}", x.len(), program.variables());
         return Err(SolveError::WarmStartShape(sizes).into());
     }
     let mut reached = BoundSet::EMPTY;

@@ -7,9 +7,9 @@ use crate::subject::Subject;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
 
+pub(crate) mod between_nodes;
 mod gait_hash;
 mod kept_clearance;
-pub(crate) mod motion;
 mod phase_progress;
 pub mod stick_figure;
 mod validation;

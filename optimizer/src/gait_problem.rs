@@ -2,14 +2,16 @@
 //!
 //! | constraint | rows here |
 //! |---|---|
-//! | C1 dynamics and contact | [`mechanics`], Hermite-Simpson of the zero dynamics in [`zero_dynamics`] |
-//! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity`], [`transitions`] |
+//! | C1 dynamics and contact | [`motion_and_contact_rows`], Hermite-Simpson of the zero dynamics in [`zero_dynamics_rows`] |
+//! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity_rows`], [`transitions`] |
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
-//! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`stride`] |
+//! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`joint_ranges`], [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
 //! | C8 fibre kinematics | [`fibre_integration`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
 
+pub(crate) mod active_constraint;
+mod contact_force_bounds;
 pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;
@@ -17,12 +19,13 @@ pub mod fibre_integration;
 pub mod foot_clearance;
 mod gait_of_variables;
 mod hermite_simpson;
-pub mod hip_velocity;
+pub mod hip_velocity_rows;
 pub mod inter_node_check;
+mod joint_ranges;
 pub mod layout;
 pub mod margins;
-pub mod mechanics;
 pub mod mesh_transfer;
+pub mod motion_and_contact_rows;
 pub mod muscle_forces;
 pub mod objective;
 mod problem_definition;

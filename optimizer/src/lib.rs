@@ -47,8 +47,8 @@ pub use reference::ReferenceGait;
 pub use settings::{GaitSettings, Mesh};
 pub use solve::{
     CancelToken, GaitResults, GuessTiming, InitialGuess, IterationRecord, LinearAlgebra, LocalOptimumChoice,
-    MuscleRoute, OtherLocalOptimum, SolveAttempt, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport,
-    SolveStatus, StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
+    MuscleRoute, OtherLocalOptimum, SolveError, SolveOptions, SolveOutcome, SolvePhase, SolveReport, SolveStatus,
+    SolverRun, StartedFrom, Violation, WarmStart, solve, solve_from_guesses,
 };
 pub use subject::Subject;
 pub use tuned_bounds::TunedBounds;

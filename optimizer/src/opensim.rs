@@ -56,7 +56,8 @@ impl StorageFile {
             if let Some((line, value)) = settings(header, name).next()
                 && value.parse::<usize>() != Ok(found)
             {
-                let reason = format!("the header has {name}={value}, but the file has {found}; the file is incomplete");
+                let reason =
+                    format!("the header has {name}={value}, but the file has {found}; check that the file is complete");
                 return Err(malformed(what, line, None, reason));
             }
         }

@@ -5,13 +5,14 @@ mod matching;
 mod mean_stride;
 mod motion_recording;
 mod plausibility;
+mod recorded_strides;
 mod reference_gait;
 
 pub use crate::opensim::AngleUnit;
 pub use heel_strikes::HeelStrikes;
 pub(crate) use heel_strikes::{contacts, given};
 pub use matching::{distance, nearest};
-pub use mean_stride::{RecordedStride, STRIDE_RANGE_S};
 pub use motion_recording::{MotionRecording, VerticalForce};
+pub use recorded_strides::{RecordedStride, STRIDE_RANGE_S, is_plausible, strides_between};
 pub(crate) use reference_gait::LARGEST_ANGLE_RAD;
 pub use reference_gait::{DEVIATION_COLUMNS, MeasuredPerson, REFERENCE_COLUMNS, REFERENCE_ROWS, ReferenceGait};

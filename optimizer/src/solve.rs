@@ -1,10 +1,9 @@
-//! Solving a gait problem: attempts from initial guesses or a warm start, and the outcome.
+//! Solving a gait problem: solver runs from initial guesses or a warm start, and the outcome.
 
 use crate::gait_problem::GaitProblem;
 use crate::model_error::ModelError;
 use std::time::Instant;
 
-mod attempts;
 mod cold_start_guesses;
 mod error;
 mod gait_results;
@@ -16,26 +15,27 @@ mod phases;
 mod progress;
 mod solve_outcome;
 mod solve_report;
+mod solver_runs;
 mod solver_settings;
 mod warm_start;
 
 pub use crate::cancel_token::CancelToken;
-use attempts::{FinishedAttempt, enforce_between_nodes, try_warm};
 pub use cold_start_guesses::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use error::SolveError;
 pub use gait_results::GaitResults;
-use local_optima::{choose, number_local_optima};
-pub use local_optimum_choice::LocalOptimumChoice;
+use local_optima::number_local_optima;
+use local_optimum_choice::choose;
 use multi_start::{try_guesses, try_multi_start};
-pub use options::SolveOptions;
+pub use options::{LocalOptimumChoice, SolveOptions};
 use phases::SolveContext;
 pub(crate) use phases::final_settings;
 pub use progress::{IterationRecord, SolvePhase};
 use solve_outcome::{SolveTally, other_local_optimum, outcome};
 pub use solve_report::{
-    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
-    SolveStatus, StartedFrom, Violation,
+    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveOutcome, SolveReport, SolveStatus,
+    SolverRun, StartedFrom, Violation,
 };
+use solver_runs::{FinishedRun, enforce_between_nodes, try_warm};
 pub use warm_start::WarmStart;
 pub(crate) use warm_start::check_shape;
 use warm_start::on_mesh_of;
@@ -44,8 +44,8 @@ use warm_start::on_mesh_of;
 ///
 /// A cold start solves from [`SolveOptions::initial_guesses`] initial guesses and chooses a gait by
 /// [`SolveOptions::local_optimum_choice`]. If none converges, it tries further guesses until one does
-/// ([`SolveOptions::retry`]). If a warm start does not converge, a cold start follows. Without a converged attempt,
-/// the outcome is the attempt with the smallest violation. If the gait violates bounds between its nodes, the solve
+/// ([`SolveOptions::retry`]). If a warm start does not converge, a cold start follows. Without a converged run,
+/// the outcome is the run with the smallest violation. If the gait violates bounds between its nodes, the solve
 /// continues with tightened bounds ([`SolveOptions::tightening_rounds`]). `observer` is called once per iteration, on
 /// the calling thread.
 ///
@@ -68,7 +68,7 @@ pub fn solve(
     if let Some(start) = start {
         tried.push(try_warm(&context, start, observer)?);
     }
-    if !tried.iter().any(FinishedAttempt::is_final) {
+    if !tried.iter().any(FinishedRun::is_final) {
         tried.extend(try_multi_start(&context, observer)?);
     }
     number_local_optima(&mut tried);
@@ -125,30 +125,30 @@ pub fn solve_from_guesses(
     finish(&context, tried, chosen, StartedFrom::Cold)
 }
 
-/// The outcome of the attempts.
+/// The outcome of the runs.
 fn finish(
     context: &SolveContext<'_>,
-    tried: Vec<FinishedAttempt>,
+    tried: Vec<FinishedRun>,
     chosen: usize,
     started_from: StartedFrom,
 ) -> Result<SolveOutcome, SolveError> {
     let mut tally = SolveTally::default();
     let (mut answer, mut others) = (None, Vec::<OtherLocalOptimum>::new());
-    let chosen_local_optimum = tried.get(chosen).and_then(|one| one.attempt.local_optimum);
+    let chosen_local_optimum = tried.get(chosen).and_then(|one| one.run.local_optimum);
     for (index, mut one) in tried.into_iter().enumerate() {
-        one.attempt.chosen = index == chosen;
-        tally.iterations += one.attempt.iterations;
+        one.run.chosen = index == chosen;
+        tally.iterations += one.run.iterations;
         tally.evaluation_s += one.evaluation_s;
         tally.linear_algebra.add(&one.linear_algebra);
         if index == chosen {
             answer = Some((one.candidate, one.margins));
         } else if let Some(local_optimum) =
-            one.attempt.local_optimum.filter(|local_optimum| Some(*local_optimum) != chosen_local_optimum)
+            one.run.local_optimum.filter(|local_optimum| Some(*local_optimum) != chosen_local_optimum)
             && others.iter().all(|other| other.local_optimum != local_optimum)
         {
-            others.push(other_local_optimum(context, one.candidate, &one.attempt, local_optimum));
+            others.push(other_local_optimum(context, one.candidate, &one.run, local_optimum));
         }
-        tally.attempts.push(one.attempt);
+        tally.solver_runs.push(one.run);
     }
     let Some((candidate, margins)) = answer else {
         let field = "number of guesses".to_owned();

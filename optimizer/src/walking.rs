@@ -3,6 +3,7 @@
 pub mod bezier;
 mod clearance_profile;
 pub mod domain_cycle;
+mod hip_velocity;
 pub mod impact;
 pub mod phase_variable;
 

@@ -237,7 +237,7 @@ fn opensim_columns_become_channels() {
     assert_eq!(recording.channels[0].0, "TA");
     let half = EmgRecording::from_opensim("emg.sto", &text.replace("nRows=40", "nRows=41")).unwrap_err().to_string();
     assert!(
-        half.contains("emg.sto, line 3: the header has nRows=41, but the file has 40; the file is incomplete"),
+        half.contains("emg.sto, line 3: the header has nRows=41, but the file has 40; check that the file is complete"),
         "{half}"
     );
 }

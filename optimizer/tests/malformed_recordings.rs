@@ -109,17 +109,17 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
         (
             "a row taken out",
             change(&format!("{}\n", line(&whole, 50)), ""),
-            "walk.mot, line 3: the header has nRows=221, but the file has 220; the file is incomplete",
+            "walk.mot, line 3: the header has nRows=221, but the file has 220; check that the file is complete",
         ),
         (
             "number of columns",
             change("nColumns=10", "nColumns=9"),
-            "walk.mot, line 4: the header has nColumns=9, but the file has 10; the file is incomplete",
+            "walk.mot, line 4: the header has nColumns=9, but the file has 10; check that the file is complete",
         ),
         (
             "number of rows no number",
             change("nRows=221", "nRows=many"),
-            "walk.mot, line 3: the header has nRows=many, but the file has 221; the file is incomplete",
+            "walk.mot, line 3: the header has nRows=many, but the file has 221; check that the file is complete",
         ),
         (
             "no column names",

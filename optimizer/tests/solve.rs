@@ -41,7 +41,7 @@ fn warm_start_converges_after_a_cold_solve() {
     assert!(report.gait_rmse_rad > 0.1 && report.gait_rmse_rad < 3.0, "{}", report.gait_rmse_rad);
     assert_eq!(COLD.gait.domains.len(), 8);
     // The two initial guesses end in one or two local optima.
-    let local_optima: Vec<_> = report.attempts.iter().map(|a| (a.local_optimum, a.objective)).collect();
+    let local_optima: Vec<_> = report.solver_runs.iter().map(|a| (a.local_optimum, a.objective)).collect();
     assert_eq!(local_optima[0].0, Some(1));
     assert_eq!(
         local_optima[1].0 == Some(1),
@@ -52,9 +52,9 @@ fn warm_start_converges_after_a_cold_solve() {
     let warm = solved(&problem("a5=0.013"), Some(&COLD.warm_start), 400);
     assert_eq!((warm.report.status, warm.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
     assert!(warm.report.iterations < report.iterations, "{} {}", warm.report.iterations, report.iterations);
-    let attempts = &warm.report.attempts;
-    assert_eq!(attempts[0].strategy, "warm start");
-    assert!(attempts.iter().rev().map(|a| a.chosen).eq((0..attempts.len()).map(|i| i == 0)));
+    let runs = &warm.report.solver_runs;
+    assert_eq!(runs[0].strategy, "warm start");
+    assert!(runs.iter().rev().map(|a| a.chosen).eq((0..runs.len()).map(|i| i == 0)));
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn bounds_hold_between_the_nodes() {
     assert_eq!(kept.report.status, SolveStatus::Converged);
     assert!(kept.report.tightened_bounds > 0 && kept.report.max_violation <= 1e-6);
     assert_eq!(failures_between_points(&kept), Vec::<String>::new());
-    let last = kept.report.attempts.last().unwrap();
+    let last = kept.report.solver_runs.last().unwrap();
     assert!(last.chosen && last.strategy.contains("tightened"), "{last:?}");
     let dearer = kept.report.objective / at_points.report.objective - 1.0;
     assert!((0.0..0.01).contains(&dearer), "{dearer}");
@@ -199,18 +199,18 @@ fn bounds_without_a_posture_are_solved_from_a_relaxed_guess() {
         "cold, direct, heel rise late on the right, late on the left",
     ];
     for (bounds, retry, tried) in [("a6=0,a7=10,a8=10", true, 12), ("a7=5,a8=5", false, 3)] {
-        let attempt = |warm: Option<&WarmStart>, retry: bool| {
+        let run = |warm: Option<&WarmStart>, retry: bool| {
             let options = SolveOptions { max_iterations: 15, retry, ..SolveOptions::default() };
             solve(&problem(bounds), warm, &options, &mut |_| {}, &CancelToken::new()).unwrap()
         };
-        let cold = attempt(None, false);
+        let cold = run(None, false);
         assert_eq!(cold.report.status, SolveStatus::IterationLimit);
         assert!(cold.report.iterations >= 15 && !cold.violations.is_empty() && cold.report.max_violation > 1e-6);
 
-        let warm = attempt(Some(&COLD.warm_start), retry).report;
+        let warm = run(Some(&COLD.warm_start), retry).report;
         assert_ne!(warm.status, SolveStatus::Converged);
-        assert!(warm.attempts.iter().map(|a| a.strategy.as_str()).eq(strategies[..tried].iter().copied()));
-        assert_eq!(warm.attempts.iter().filter(|a| a.chosen).count(), 1);
+        assert!(warm.solver_runs.iter().map(|a| a.strategy.as_str()).eq(strategies[..tried].iter().copied()));
+        assert_eq!(warm.solver_runs.iter().filter(|a| a.chosen).count(), 1);
         assert!(warm.max_violation <= cold.report.max_violation, "the better of the two is kept");
     }
 }
@@ -233,13 +233,13 @@ fn unfinished_solve_lists_violations_below_its_tolerance() {
 }
 
 #[test]
-fn unusable_warm_start_is_an_attempt_with_a_reason() {
+fn unusable_warm_start_is_a_solver_run_with_a_reason() {
     let mut warm = COLD.warm_start.clone();
     warm.point.x[7] = f64::NAN;
-    let attempts = solved(&problem(""), Some(&warm), 5).report.attempts;
-    assert_eq!((attempts[0].status, attempts[0].iterations), (SolveStatus::Stalled, 0));
-    assert_eq!(attempts[0].reason, "invalid start: x[7] is NaN");
-    assert!(attempts[1].iterations > 0 && attempts[1].reason.is_empty());
+    let runs = solved(&problem(""), Some(&warm), 5).report.solver_runs;
+    assert_eq!((runs[0].status, runs[0].iterations), (SolveStatus::Stalled, 0));
+    assert_eq!(runs[0].reason, "invalid start: x[7] is NaN");
+    assert!(runs[1].iterations > 0 && runs[1].reason.is_empty());
 }
 
 #[test]
@@ -247,7 +247,7 @@ fn cold_start_without_retry_tries_its_guesses_only() {
     let options = SolveOptions { max_iterations: 3, retry: false, ..SolveOptions::default() };
     let outcome = solve(&problem(""), None, &options, &mut |_| {}, &CancelToken::new()).unwrap();
     assert_ne!(outcome.report.status, SolveStatus::Converged);
-    assert_eq!(outcome.report.attempts.len(), options.initial_guesses);
+    assert_eq!(outcome.report.solver_runs.len(), options.initial_guesses);
 }
 
 #[test]
@@ -256,10 +256,10 @@ fn warm_start_is_transferred_between_meshes() {
     finer.settings.mesh = Mesh { ds2: 6, ds3: 6, ss2: 8, ss1: 8 };
     let fine = solved(&finer, Some(&COLD.warm_start), 400);
     assert_eq!((fine.report.status, fine.report.started_from), (SolveStatus::Converged, StartedFrom::Warm));
-    assert_eq!(fine.report.attempts[0].strategy, "warm start from another mesh");
-    let guesses = &COLD.report.attempts[..SolveOptions::default().initial_guesses];
+    assert_eq!(fine.report.solver_runs[0].strategy, "warm start from another mesh");
+    let guesses = &COLD.report.solver_runs[..SolveOptions::default().initial_guesses];
     let cold: usize = guesses.iter().map(|a| a.iterations).min().unwrap();
-    let moved = fine.report.attempts[0].iterations;
+    let moved = fine.report.solver_runs[0].iterations;
     assert!(moved < cold, "{moved} {cold}");
     assert_eq!(fine.warm_start.mesh, finer.settings.mesh);
 }

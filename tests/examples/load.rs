@@ -8,7 +8,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gait_optimizer::{CancelToken, IterationRecord, SolveOutcome};
-use gaitwright_service::studies::same_motion::is_same_gait;
+use gaitwright_service::studies::identical_gaits::is_same_gait;
 use gaitwright_service::workers::{Assignment, Evaluate, GaitSolver};
 use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};

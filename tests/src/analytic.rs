@@ -156,7 +156,7 @@ fn outcome(assignment: &Assignment, status: SolveStatus, rmse: f64) -> SolveOutc
             stride_length_m: 1.3,
             durations_s: [0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1],
             vhip_m_s: [1.0; 4],
-            attempts: vec![gait_optimizer::SolveAttempt {
+            solver_runs: vec![gait_optimizer::SolverRun {
                 strategy: "analytic".to_owned(),
                 status: SolveStatus::Converged,
                 iterations: 3,

@@ -26,6 +26,15 @@ pub fn skipped(reason: &str) {
     }
 }
 
+/// [`skipped`], unless the environment variable `required` is set: then the current test fails.
+///
+/// # Panics
+/// If the variable is set, and as [`skipped`].
+pub fn skipped_unless_required(required: &str, reason: &str) {
+    assert!(std::env::var_os(required).is_none(), "{reason}, and {required} is set");
+    skipped(reason);
+}
+
 /// The name of the test program, without the hash that Cargo adds to it: `serve::`.
 fn program() -> String {
     let path = std::env::current_exe().unwrap_or_default();

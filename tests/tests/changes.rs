@@ -9,7 +9,7 @@ use axum::http::{Request, header};
 use gaitwright_http::openapi;
 use gaitwright_service::access::Role;
 use gaitwright_service::studies::bound_grid;
-use gaitwright_service::studies::same_motion::is_same_gait;
+use gaitwright_service::studies::identical_gaits::is_same_gait;
 use gaitwright_store::audit::{self, ChainCheck};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow};
 use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};

@@ -172,7 +172,7 @@ fn file_other_than_a_database_is_refused_by_name_and_unchanged() {
         refused_beside(&["notes.txt"], &with("notes.txt"), "notes.txt is not a Gaitwright database");
     }
     refused_beside(&[], &["tune", "--database", "folder"], "folder is not a Gaitwright database: it is a folder");
-    refused_beside(&[], &["tune", "--database", "nowhere/a.db"], "Cannot open the database nowhere/a.db");
+    refused_beside(&[], &["tune", "--database", "nowhere/a.db"], "Cannot open or write nowhere/a.db");
     // Only the first bytes are valid.
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = b"SQLite format 3\0".to_vec();
@@ -227,7 +227,7 @@ fn service_with_a_taken_port_creates_no_files() {
 
 #[tokio::test]
 async fn error_for_a_read_only_database_names_the_missing_permission() {
-    refused(&["tune", "--database", "missing/a.db"], "Cannot open the database missing/a.db");
+    refused(&["tune", "--database", "missing/a.db"], "Cannot open or write missing/a.db");
     // Root may write everywhere, so a folder stands in the way of the write-ahead log.
     let folder = tempfile::tempdir().unwrap();
     Store::open(&folder.path().join("made.db")).await.unwrap().close().await;
@@ -236,10 +236,7 @@ async fn error_for_a_read_only_database_names_the_missing_permission() {
     let output = gaitwright(folder.path(), &["tune", "--database", "a.db"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(
-        text.contains("Cannot open the database a.db") && text.contains("and its folder must be writable"),
-        "{text}"
-    );
+    assert!(text.contains("Cannot open or write a.db") && text.contains("and its folder must be writable"), "{text}");
 }
 
 #[test]
@@ -324,10 +321,7 @@ fn printing_to_a_full_device_fails_with_a_message_and_code_1() {
             .unwrap();
         let text = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
-        assert!(
-            text.starts_with("gaitwright: Cannot write to standard output: ") && text.lines().count() == 1,
-            "{text}"
-        );
+        assert!(text.starts_with("gaitwright: Cannot write the output: ") && text.lines().count() == 1, "{text}");
     }
     // If stderr cannot be written either, only the exit code reports the error.
     let output = cli::command(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &["openapi"])

@@ -4,9 +4,9 @@
 
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::certified_best::BestCertification;
+use gaitwright_service::studies::recommended_trial::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::summary;
-use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;

@@ -4,8 +4,8 @@
 
 use axum::http::StatusCode;
 use gait_optimizer::emg::EmgSettings;
+use gaitwright_service::studies::identical_gaits::is_same_gait;
 use gaitwright_service::studies::lab;
-use gaitwright_service::studies::same_motion::is_same_gait;
 use gaitwright_service::workers::Evaluate;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::studies::StudyState;

@@ -1,12 +1,13 @@
 //! The Python client: it is what its generator makes of the description, its types hold, and the example, the guide and
-//! the notebook run against a service. Where python3 or a module is absent, a test is skipped with a message.
+//! the notebook run against a service. Where python3 or a module is absent, a test is skipped with a
+//! message, unless `GAITWRIGHT_REQUIRE_PYTHON` is set.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
-use gaitwright_tests::skipped::skipped;
+use gaitwright_tests::skipped::skipped_unless_required;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -32,7 +33,7 @@ fn python(arguments: &[&str]) -> std::io::Result<Output> {
 fn has(modules: &[&str]) -> bool {
     for import in modules.iter().map(|module| format!("import {module}")) {
         if !python(&["-c", &import]).is_ok_and(|output| output.status.success()) {
-            skipped(&format!("python3 cannot {import}"));
+            skipped_unless_required("GAITWRIGHT_REQUIRE_PYTHON", &format!("python3 cannot {import}"));
             return false;
         }
     }

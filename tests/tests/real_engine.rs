@@ -69,17 +69,17 @@ fn commands_solve_a_gait_cold_and_warm_and_a_sweep() {
     // Every local optimum that the guesses reach is kept, and can be started from.
     let many = ["solve", "--json", "--initial-guesses", "4", "--out", "many.json"];
     let many = json_of(&gaitwright(folder, &[&many[..], &COARSE].concat()));
-    let attempts = many["attempts"].as_array().unwrap();
-    let answer = attempts.iter().find(|attempt| attempt["chosen"] == true).unwrap()["local_optimum"].as_u64().unwrap();
-    let other = attempts
+    let runs = many["solver_runs"].as_array().unwrap();
+    let answer = runs.iter().find(|run| run["chosen"] == true).unwrap()["local_optimum"].as_u64().unwrap();
+    let other = runs
         .iter()
-        .find(|attempt| attempt["local_optimum"].as_u64().is_some_and(|local_optimum| local_optimum != answer))
+        .find(|run| run["local_optimum"].as_u64().is_some_and(|local_optimum| local_optimum != answer))
         .unwrap();
     let number = other["local_optimum"].to_string();
     let again = ["solve", "--json", "--warm", "many.json", "--warm-local-optimum", &number];
     let again = json_of(&gaitwright(folder, &[&again[..], &COARSE].concat()));
-    assert_eq!(again["attempts"][0]["status"], "converged");
-    let away = again["attempts"][0]["gait_rmse_rad"].as_f64().unwrap() - other["gait_rmse_rad"].as_f64().unwrap();
+    assert_eq!(again["solver_runs"][0]["status"], "converged");
+    let away = again["solver_runs"][0]["gait_rmse_rad"].as_f64().unwrap() - other["gait_rmse_rad"].as_f64().unwrap();
     assert!(away.abs() < 1e-3, "{away}");
     assert_eq!(again["lineage"]["ancestors"][0]["local_optimum"].as_u64(), other["local_optimum"].as_u64());
     let unknown = cli::run(
@@ -490,7 +490,7 @@ fn long_solve_of_a_gait_with_muscles_converges() {
     let mesh = ["--mesh", "3,3,4,4", "--json"];
     let cold = json_of(&gaitwright(folder.path(), &[&["solve", "--out", "gait.json"][..], &mesh].concat()));
     assert_eq!(cold["status"], "converged");
-    assert!(cold["attempts"].as_array().unwrap().len() >= 2, "several guesses");
+    assert!(cold["solver_runs"].as_array().unwrap().len() >= 2, "several guesses");
     let warm = ["solve", "--warm", "gait.json", "--bounds", "a5=0.013"];
     let warm = json_of(&gaitwright(folder.path(), &[&warm[..], &mesh].concat()));
     assert_eq!((&warm["status"], &warm["started_from"]), (&json!("converged"), &json!("warm")));

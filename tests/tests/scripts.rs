@@ -11,7 +11,7 @@ use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::service::{Answer, Service};
-use gaitwright_tests::skipped::skipped;
+use gaitwright_tests::skipped::skipped_unless_required;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::Path;
@@ -72,7 +72,7 @@ async fn lab_script_finishes_a_study_and_two_runs_give_the_same_trials() {
 async fn the_octave_script_runs_a_study_to_its_end() {
     let (_folder, service) = service().await;
     if Command::new("curl").arg("--version").output().is_err() {
-        return skipped("there is no curl");
+        return skipped_unless_required("GAITWRIGHT_REQUIRE_OCTAVE", "there is no curl");
     }
     let command = format!("ask_tell('http://{}')", service.listening().await);
     #[allow(clippy::disallowed_methods)] // a test waits for a process or a thread
@@ -80,7 +80,9 @@ async fn the_octave_script_runs_a_study_to_its_end() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../server/clients/matlab");
         Command::new("octave-cli").args(["--no-init-file", "--eval", &command]).current_dir(folder).output()
     });
-    let Ok(output) = ran.await.unwrap() else { return skipped("there is no octave-cli") };
+    let Ok(output) = ran.await.unwrap() else {
+        return skipped_unless_required("GAITWRIGHT_REQUIRE_OCTAVE", "there is no octave-cli");
+    };
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(text.lines().filter(|line| line.starts_with("trial ")).count(), 10, "{text}");

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A retired word and the word of the glossary. It counts wherever no letter, digit or underscore precedes or follows it.
-const RETIRED: [(&str, &str); 57] = [
+const RETIRED: [(&str, &str); 58] = [
+    ("basin", "local optimum"),
     ("belief", "analysis, posterior"),
     ("beliefs", "analyses, posteriors"),
     ("Belief", "Analysis"),

@@ -38,7 +38,7 @@ for (const form of document.querySelectorAll("form[data-path]")) {
       }
       answer.textContent = `${reply.status} ${reply.statusText}\n${shown.slice(0, 20000)}`;
     } catch (error) {
-      answer.textContent = String(error);
+      answer.textContent = `The request could not be sent (${error.message}). Check the connection and try again.`;
     }
   });
 }

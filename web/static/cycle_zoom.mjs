@@ -121,7 +121,7 @@ function addControls(title) {
   zoom.querySelector("summary")?.setAttribute("aria-label", `Zoom: ${name}`);
   const form = /** @type {HTMLFormElement} */ (zoom.querySelector("form"));
   const [from, to] = /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll("input")]);
-  const check = () => to.setCustomValidity(Number(to.value) - Number(from.value) < LEAST ? `At least ${LEAST} % after the start.` : "");
+  const check = () => to.setCustomValidity(Number(to.value) - Number(from.value) < LEAST ? `The end must be at least ${LEAST} % after the start.` : "");
   form.addEventListener("input", check);
   form.addEventListener("submit", (event) => {
     event.preventDefault();

@@ -55,7 +55,7 @@ if (form) {
     const reply = await fetch(form.action, { method: "POST", body: new URLSearchParams(entry) }).catch(() => null);
     if (!reply || reply.status >= 500) {
       sending = false;
-      offer("The service cannot be reached. Your answer may not have been saved.", entry);
+      offer("The service is not available. Your answer may not have been saved.", entry);
       return;
     }
     if (reply.status !== 401) sessionStorage.removeItem(key);

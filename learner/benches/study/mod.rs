@@ -67,15 +67,14 @@ pub fn earlier(log: &FeedbackLog) -> FeedbackLog {
     }
 }
 
-/// The computations of a study page: marginals, a slice, the best action from 1,000 joint samples, the probabilities of
-/// convergence and preference of each visited action, and the agreement with the feedback.
+/// The computations of a study page: marginals, a slice, the probabilities of convergence and preference of each
+/// visited action, and the agreement with the feedback.
 pub fn page(posterior: &Posterior) {
     let best = posterior.best().expect("tried");
     for dimension in 0..posterior.space().dimensions().len() {
         black_box(posterior.marginal(dimension).expect("exists"));
     }
     black_box(posterior.slice(4, 5, best).expect("exists"));
-    black_box(posterior.best_of_visited(1000, 1).expect("factors"));
     for &action in posterior.visited() {
         black_box(posterior.probability_of_converging(action).expect("exists"));
         black_box(posterior.preference_probability(action, best).expect("exists"));

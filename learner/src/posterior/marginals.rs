@@ -1,4 +1,4 @@
-//! The utility as a function of one or two dimensions, and how much a dimension matters.
+//! The utility as a function of one or two dimensions.
 
 use serde::{Deserialize, Serialize};
 
@@ -29,35 +29,24 @@ pub struct Slice {
     pub predictions: Vec<Vec<Prediction>>,
 }
 
-/// How much the utility depends on a dimension, averaged over all levels of the other dimensions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct MainEffect {
-    /// Value with the highest marginal utility, in the unit of the dimension.
-    pub best: f64,
-    /// Value with the lowest marginal utility.
-    pub worst: f64,
-    /// The difference of their marginal utilities.
-    pub difference: Prediction,
-}
-
 /// The average of the utility at one level of a dimension, with what its covariances need.
-struct AverageView {
+pub(super) struct AverageView {
     profile: Vec<Option<usize>>,
     prior: Vec<f64>,
     left: Vec<f64>,
     right: Vec<f64>,
-    mean: f64,
+    pub(super) mean: f64,
 }
 
 impl AverageView {
-    fn covariance(&self, other: &Self, process: &GaussianProcess) -> f64 {
+    pub(super) fn covariance(&self, other: &Self, process: &GaussianProcess) -> f64 {
         process.kernel.average_covariance(&self.profile, &other.profile) - dot(&self.prior, &other.prior)
             + dot(&self.left, &other.right)
     }
 }
 
 impl Posterior {
-    fn average_view(&self, dimension: usize, level: usize) -> AverageView {
+    pub(super) fn average_view(&self, dimension: usize, level: usize) -> AverageView {
         let process = &self.utility;
         let observed = process.observed();
         let profile: Vec<Option<usize>> =
@@ -81,29 +70,6 @@ impl Posterior {
             Marginal { value, average: Prediction { mean: view.mean, standard_deviation: variance.max(0.0).sqrt() } }
         };
         Ok(self.dimension(dimension)?.values.iter().enumerate().map(marginal).collect())
-    }
-
-    /// The difference between the highest and the lowest marginal utility of a dimension.
-    ///
-    /// # Errors
-    /// If the dimension does not exist.
-    pub fn main_effect(&self, dimension: usize) -> Result<MainEffect> {
-        let values = &self.dimension(dimension)?.values;
-        let views: Vec<AverageView> = (0..values.len()).map(|level| self.average_view(dimension, level)).collect();
-        let (mut best, mut worst) = (0, 0);
-        for (level, view) in views.iter().enumerate() {
-            if view.mean > views[best].mean {
-                best = level;
-            }
-            if view.mean < views[worst].mean {
-                worst = level;
-            }
-        }
-        let covariance = |a: usize, b: usize| views[a].covariance(&views[b], &self.utility);
-        let variance = covariance(best, best) + covariance(worst, worst) - 2.0 * covariance(best, worst);
-        let mean = views[best].mean - views[worst].mean;
-        let difference = Prediction { mean, standard_deviation: variance.max(0.0).sqrt() };
-        Ok(MainEffect { best: values[best], worst: values[worst], difference })
     }
 
     /// Predictions over the levels of two dimensions. The other dimensions are fixed at the levels of `through`.

@@ -5,6 +5,7 @@ use crate::error::LearnerError;
 use crate::feedback::{Feedback, FeedbackLog};
 use crate::learner::posterior;
 use crate::linalg::dot;
+use crate::random::Random;
 use crate::search_space::{Dimension, SearchSpace};
 use crate::settings::{Labels, LearnerSettings, Method};
 
@@ -100,7 +101,7 @@ fn difference_has_the_probability_of_a_noiseless_preference() {
 }
 
 #[test]
-fn best_of_two_has_the_probability_of_a_noiseless_preference() {
+fn joint_samples_have_the_probability_of_a_noiseless_preference() {
     for nugget in [1e-5, 0.1, 1.0] {
         let (winner, loser) = (ActionIndex(0), ActionIndex(20));
         let log =
@@ -108,9 +109,12 @@ fn best_of_two_has_the_probability_of_a_noiseless_preference() {
         let settings = LearnerSettings { nugget, preference_noise: 1e-3, ..LearnerSettings::published(Method::Eubo) };
         let estimate = posterior(&space(), &log, &settings).unwrap();
         let preferred = estimate.preference_probability(winner, loser).unwrap();
-        let best = estimate.best_of_visited(4000, 1).unwrap();
-        assert_eq!(best[0].action, winner);
-        assert!((best[0].probability - preferred).abs() < 0.012, "{nugget}: {} {preferred}", best[0].probability);
+        let sampler = estimate.sampler(&[winner, loser]).unwrap();
+        let mut random = Random::new(1, 0);
+        let wins =
+            (0..4000).map(|_| sampler.sample(&mut random)).filter(|utilities| utilities[0] > utilities[1]).count();
+        let share = wins as f64 / 4000.0;
+        assert!((share - preferred).abs() < 0.012, "{nugget}: {share} {preferred}");
     }
 }
 
@@ -127,10 +131,6 @@ fn probabilities_means_and_agreement_are_consistent() {
             assert!(estimate.probability_of_converging(a).unwrap() > estimate.probability_of_converging(c).unwrap());
             let categories = estimate.category_probabilities(b).unwrap();
             assert!((categories.iter().sum::<f64>() - 1.0).abs() < 1e-9);
-            let best = estimate.best_of_visited(500, 1).unwrap();
-            assert_eq!(best[0].action, a);
-            assert!((best.iter().map(|b| b.probability).sum::<f64>() - 1.0).abs() < 1e-9);
-            assert!(!estimate.best_of_grid(50, 1).unwrap().is_empty());
             let agreement = estimate.agreement();
             assert_eq!((agreement.comparisons, agreement.comparisons_agreeing), (2, 2));
             assert_eq!((agreement.labels, agreement.labels_agreeing, agreement.no_difference), (2, 2, 1));

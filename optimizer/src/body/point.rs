@@ -52,20 +52,6 @@ impl Chain {
         }
         jacobian
     }
-
-    /// Part of the acceleration that depends on velocities, `Jdot qd`, m/s².
-    pub fn jacobian_dot_qd(&self, q: &[f64; 9], qd: &[f64; 9]) -> [f64; 2] {
-        let psi = link_angles(&angles_of(q));
-        let rate = link_angles(&angles_of(qd));
-        let mut a = [0.0; 2];
-        for &(link, ux, uz) in &self.segments {
-            let (s, c) = psi[link].sin_cos();
-            let squared = rate[link] * rate[link];
-            a[0] -= squared * (c * ux - s * uz);
-            a[1] -= squared * (s * ux + c * uz);
-        }
-        a
-    }
 }
 
 /// The seven angles of a coordinate vector.

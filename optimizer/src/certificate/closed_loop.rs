@@ -1,28 +1,21 @@
 //! The closed loop: consecutive strides, and contacts, friction and torques over the periodic stride.
 
-use super::check::{Check, CheckLocation, Quantity, WorstValues};
+use super::check::{Check, CheckLocation, WorstValues};
 use super::feedback_linearization::{State, split};
 use super::hybrid_walker::{CompletedDomain, Fall, HybridWalker};
-use super::limit_excess::{AllowedRanges, CONTACT_THRESHOLD_N, FRICTION_THRESHOLD_N, depth_below_ground};
+use super::limit_excess::{AllowedRanges, depth_below_ground};
+use super::limits::{
+    CLOSED_LOOP_ANGLE as ANGLE, CLOSED_LOOP_DEPTH as DEPTH, CLOSED_LOOP_FRICTION as FRICTION,
+    CLOSED_LOOP_IMPULSE as IMPULSE, CLOSED_LOOP_NORMAL_FORCE as NORMAL_FORCE, CLOSED_LOOP_ORBIT_ANGLE as ORBIT_ANGLE,
+    CLOSED_LOOP_ORBIT_RATE as ORBIT_RATE, CLOSED_LOOP_SPEED as SPEED, CLOSED_LOOP_TORQUE as TORQUE,
+};
 use crate::body::PointState;
 use crate::gait::Gait;
-use crate::gait::motion::instant;
+use crate::gait::between_nodes::instant;
 use crate::walking::CYCLE;
 
 /// Number of simulated strides.
 pub const STRIDES: usize = 20;
-
-const ORBIT_ANGLE: Quantity = Quantity::limited("orbit error, angles", "rad", 5e-3);
-const ORBIT_RATE: Quantity = Quantity::limited("orbit error, rates", "rad/s", 0.05);
-// An optimal gait unloads the trailing foot completely, on the boundary of contact and friction, and the simulation may
-// cross it by the mesh error. The limit is the force below which a gait laboratory does not register contact.
-const NORMAL_FORCE: Quantity = Quantity::limited("unilateral contact", "N", CONTACT_THRESHOLD_N);
-const FRICTION: Quantity = Quantity::limited("friction cone", "N", FRICTION_THRESHOLD_N);
-const TORQUE: Quantity = Quantity::limited("torques", "N m", 5.0);
-const ANGLE: Quantity = Quantity::limited("joint angles", "rad", 0.01);
-const SPEED: Quantity = Quantity::limited("velocities", "rad/s", 0.2);
-const DEPTH: Quantity = Quantity::limited("feet above the ground", "m", 1e-3);
-const IMPULSE: Quantity = Quantity::limited("tensile landing impulse", "N s", 0.0);
 
 /// Simulates [`STRIDES`] strides from the first state of the gait, and measures the distance to it after each stride.
 pub(super) fn orbit(walker: &HybridWalker<'_>, start: &State) -> Result<Vec<Check>, Fall> {

@@ -1,7 +1,7 @@
 //! The findings of the residuals: the worst value of each quantity, at the nodes and between them.
 
 use super::check::{Check, CheckLocation, Quantity, WorstValues};
-use crate::gait::motion::GaitInstant;
+use crate::gait::between_nodes::GaitInstant;
 
 /// A quantity with two limits: at the nodes, where the gait problem imposes the constraint, and between them, where the
 /// error depends on the mesh. Quantities of torques and muscle states have no limit between nodes (`None`), because no

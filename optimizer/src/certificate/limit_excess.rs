@@ -5,11 +5,6 @@ use crate::body::{Axis, FootPoint, PointState, Side, WalkerModel};
 use crate::gait::Gait;
 use crate::walking::{ContactRow, Domain};
 
-/// Vertical force from which a gait laboratory registers contact, N. Smaller violations are irrelevant in practice.
-pub(super) const CONTACT_THRESHOLD_N: f64 = 20.0;
-/// Friction of that force at a coefficient of 0.6, N.
-pub(super) const FRICTION_THRESHOLD_N: f64 = 12.0;
-
 /// Ranges of coordinates, velocities and torques.
 #[derive(Debug, Clone)]
 pub(super) struct AllowedRanges {

@@ -1,19 +1,15 @@
 //! Residuals of C5 to C12.
 
-use super::check::{CheckLocation, Quantity, WorstValues};
-use super::findings::{Findings, GridPoint, MeasuredQuantity};
+use super::check::{CheckLocation, WorstValues};
+use super::findings::{Findings, GridPoint};
+use super::limits::{
+    MUSCLE_FORCE as FORCE, MUSCLE_LENGTH as LENGTH, MUSCLE_RANGE as RANGE, MUSCLE_RESET as RESET,
+    MUSCLE_TORQUE as TORQUE, MUSCLE_VELOCITY as VELOCITY,
+};
 use crate::gait::MuscleTrajectory;
-use crate::gait::motion::MuscleInstant;
+use crate::gait::between_nodes::MuscleInstant;
 use crate::muscle::{MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
 use crate::settings::GaitLimits;
-
-const FORCE: MeasuredQuantity = MeasuredQuantity::new("C5-C7 equilibrium of fibre and tendon", "F_max", 1e-6, None);
-const VELOCITY: MeasuredQuantity = MeasuredQuantity::new("C8 fibre velocity", "l_opt/s", 1e-4, Some(0.5));
-const LENGTH: MeasuredQuantity = MeasuredQuantity::new("C8 fibre lengths from their velocities", "l_opt", 1e-6, None);
-const TORQUE: MeasuredQuantity = MeasuredQuantity::new("C9-C12 joint torques of the muscles", "N m", 1e-4, None);
-const RANGE: MeasuredQuantity =
-    MeasuredQuantity::new("C5-C8 activations, fibre lengths and velocities", "", 3e-6, Some(0.05));
-const RESET: Quantity = Quantity::limited("C2 continuity of fibre lengths", "l_opt", 1e-6);
 
 /// Measures a grid point.
 pub(super) fn add(

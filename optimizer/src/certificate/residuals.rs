@@ -1,49 +1,25 @@
 //! Residuals of C1 to C4 at the nodes and on a finer grid between them.
 
-use super::check::{Check, CheckLocation, Quantity, WorstValues};
+use super::check::{Check, CheckLocation, WorstValues};
 use super::contact_kinematics::Contact;
-use super::findings::{Findings, GridPoint, MeasuredQuantity};
-use super::limit_excess::{AllowedRanges, FRICTION_THRESHOLD_N, depth_below_ground};
+use super::findings::{Findings, GridPoint};
+use super::limit_excess::{AllowedRanges, depth_below_ground};
+use super::limits::{
+    ACCELERATION, ANGLE, CLEARANCE, CONTACT_ACCELERATION, CONTACT_POSITION, CONTACT_VELOCITY, DEPTH, FORCE, FRICTION,
+    HIP_POSITION, HIP_VELOCITY, IMPACT, IMPACT_FRICTION, IMPULSE, IMPULSE_SIZE, KEPT_LOAD, MOMENT, NORMAL_FORCE,
+    OUTPUT, OUTPUT_RATE, PROGRESS, RESET, SPEED, STRIDE, TORQUE, TOUCHDOWN,
+};
 use super::muscle_residuals;
 use super::virtual_constraints::VirtualConstraints;
 use crate::body::{Axis, FootPoint, GRAVITY, InverseDynamics, PointState, Side, WalkerModel};
 use crate::gait::Gait;
-use crate::gait::motion::{GaitInstant, instant};
+use crate::gait::between_nodes::{GaitInstant, instant};
 use crate::walking::{CYCLE, ContactRow, Domain, DomainKind};
 
 /// Number of grid points between adjacent nodes, in the middle of as many equal parts. The solve divides the same time
 /// into ten parts and tightens bounds at their ends. No point of this grid is one of those, so that a gait is judged where
 /// nothing was tightened.
 const BETWEEN_NODES: usize = 24;
-
-// At nodes: 1e-6, the tolerance of a converged gait, times the scale of the row in the gait problem.
-const FORCE: MeasuredQuantity = MeasuredQuantity::new("C1 equations of motion, forces", "N", 1e-4, None);
-const MOMENT: MeasuredQuantity = MeasuredQuantity::new("C1 equations of motion, moments", "N m", 1e-4, None);
-const CONTACT_POSITION: MeasuredQuantity = MeasuredQuantity::new("C1 contact position", "m", 1e-6, Some(1e-3));
-const CONTACT_VELOCITY: MeasuredQuantity = MeasuredQuantity::new("C1 contact velocity", "m/s", 1e-6, Some(0.02));
-const CONTACT_ACCELERATION: MeasuredQuantity =
-    MeasuredQuantity::new("C1 contact acceleration", "m/s²", 1e-5, Some(2.0));
-const OUTPUT: MeasuredQuantity = MeasuredQuantity::new("C2 virtual constraints", "rad", 1e-6, Some(1e-3));
-const OUTPUT_RATE: MeasuredQuantity = MeasuredQuantity::new("C2 virtual constraints, rate", "rad/s", 1e-6, Some(0.05));
-const HIP_POSITION: MeasuredQuantity = MeasuredQuantity::new("C2 hip position", "m", 1e-6, Some(1e-3));
-const HIP_VELOCITY: MeasuredQuantity = MeasuredQuantity::new("C2 hip velocity", "m/s", 1e-6, Some(0.02));
-const NORMAL_FORCE: MeasuredQuantity = MeasuredQuantity::new("C3 unilateral contact", "N", 1e-3, Some(5.0));
-const FRICTION: MeasuredQuantity = MeasuredQuantity::new("C3 friction cone", "N", 1e-3, Some(FRICTION_THRESHOLD_N));
-const KEPT_LOAD: MeasuredQuantity = MeasuredQuantity::new("C3 load of contacts before they lift off", "N", 1e-3, None);
-const PROGRESS: MeasuredQuantity = MeasuredQuantity::new("C3 forward hip velocity in SS1", "m/s", 1e-6, Some(0.02));
-const DEPTH: MeasuredQuantity = MeasuredQuantity::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
-const CLEARANCE: MeasuredQuantity = MeasuredQuantity::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
-const ANGLE: MeasuredQuantity = MeasuredQuantity::new("C4 joint angles beyond a6, a7, a8", "rad", 1e-6, Some(0.01));
-const SPEED: MeasuredQuantity = MeasuredQuantity::new("C4 velocities beyond a1", "rad/s", 3e-6, Some(0.1));
-const ACCELERATION: MeasuredQuantity = MeasuredQuantity::new("C4 accelerations beyond a2", "rad/s²", 3e-5, Some(5.0));
-const TORQUE: MeasuredQuantity = MeasuredQuantity::new("C4 torques beyond their limits", "N m", 1e-4, Some(2.0));
-const IMPACT: Quantity = Quantity::limited("C2 velocities after impacts", "rad/s", 1e-5);
-const IMPULSE: Quantity = Quantity::limited("C2 impulses of the impacts", "N s", 1e-4);
-const IMPULSE_SIZE: Quantity = Quantity::limited("C3 impulses beyond their limit", "N s", 1e-4);
-const IMPACT_FRICTION: Quantity = Quantity::limited("C3 friction cone of heel strikes", "N s", 1e-4);
-const RESET: Quantity = Quantity::limited("C2 continuity of the stride", "rad", 3e-6);
-const TOUCHDOWN: Quantity = Quantity::limited("C3 touchdown speed", "m/s", 1e-6);
-const STRIDE: Quantity = Quantity::limited("C4 hip velocity (a3, a4), steps, speed, durations", "", 1e-6);
 
 /// Largest absolute value.
 fn largest(values: impl Iterator<Item = f64>) -> f64 {

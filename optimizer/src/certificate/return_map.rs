@@ -3,8 +3,8 @@
 //! The section is the state after right heel strike without px, on which nothing depends: 17 numbers. Directions that
 //! violate the contacts have multiplier 0 and are omitted.
 
-use super::domain_differences::{ByDifferences, by_differences, possible_directions};
 use super::feedback_linearization::{State, StateMatrix, split};
+use super::finite_differences::{ByDifferences, by_differences, possible_directions};
 use super::hybrid_walker::{Fall, HybridWalker};
 use super::poincare_section::{SECTION, Section, section, with_section};
 use nalgebra::linalg::Schur;
@@ -128,7 +128,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
     let (_, derivative) = walker.stride_with_derivative(&fixed)?;
     let derivative = section_matrix(&derivative);
     let no_eigenvalues = || Fall::NotIntegrable {
-        domain: "stride",
+        domain: "the stride",
         reason: "the eigenvalues of the stride-to-stride map did not converge".to_owned(),
     };
     let possible = possible_directions(&walker.controls[0], &fixed);

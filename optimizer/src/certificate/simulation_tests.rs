@@ -7,7 +7,7 @@ use super::limit_excess::AllowedRanges;
 use super::residuals::{residuals, residuals_on};
 use super::return_map::return_map;
 use crate::body::{Chain, GRAVITY, PointState, WalkerModel};
-use crate::gait::motion::instant;
+use crate::gait::between_nodes::instant;
 use crate::walking::kinetic_energy;
 use crate::{CancelToken, Gait, GaitProblem, Mesh, SolveOptions, SolveStatus, Subject, solve};
 use std::sync::OnceLock;

@@ -1,8 +1,8 @@
-//! Mean activity of a muscle over the gait cycle, and EMG RMSE.
+//! Mean activity of a muscle over the gait cycle.
 
 use super::envelope::Envelope;
 use crate::model_error::ModelError;
-use crate::reference::STRIDE_RANGE_S;
+use crate::reference::{STRIDE_RANGE_S, is_plausible, strides_between};
 use serde::{Deserialize, Serialize};
 
 /// Number of points of a gait cycle: 0, 1, ..., 100 %.
@@ -19,16 +19,6 @@ pub struct CycleActivity {
     pub standard_deviation: Vec<f64>,
     /// Number of strides.
     pub strides: usize,
-}
-
-/// The strides between successive heel strikes, s.
-pub fn strides_between(heel_strikes_s: &[f64]) -> Vec<(f64, f64)> {
-    heel_strikes_s.windows(2).map(|pair| (pair[0], pair[1])).collect()
-}
-
-/// Whether a stride, s, lasts as long as strides do.
-pub fn is_plausible((start, end): (f64, f64)) -> bool {
-    (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end - start))
 }
 
 impl CycleActivity {
@@ -103,44 +93,4 @@ impl CycleActivity {
     pub fn average(&self) -> f64 {
         self.mean.iter().sum::<f64>() / self.mean.len() as f64
     }
-}
-
-/// EMG RMSE of a gait and its parts, relative to the peaks of normal walking.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EmgRmse {
-    /// Sum of the parts.
-    pub total: f64,
-    /// RMS difference of each channel, in the order of normal walking.
-    pub parts: Vec<f64>,
-    /// Warnings about doubtful channels.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<String>,
-}
-
-/// Ratio of peaks above which a channel is doubtful.
-const LARGEST_PEAK: f64 = 10.0;
-
-/// The warning for a channel that is implausibly more active than in normal walking.
-fn doubt(activity: &CycleActivity, normal: &CycleActivity) -> Option<String> {
-    let times = activity.peak() / normal.peak();
-    (times > LARGEST_PEAK).then(|| {
-        let name = &activity.channel;
-        format!("the peak of {name} is {times:.1} times that of the walk without the device; check that both recordings have the same unit")
-    })
-}
-
-/// EMG RMSE of a gait against normal walking: `sum_i sqrt(mean((s_i - n_i)^2))` over the channels of normal walking.
-/// The paper omits the square inside the mean, without which the mean could be negative.
-///
-/// # Errors
-/// [`ModelError::Unknown`] for a channel that is missing in the gait.
-pub fn emg_rmse(gait: &[CycleActivity], normal_walking: &[CycleActivity]) -> Result<EmgRmse, ModelError> {
-    let (mut parts, mut warnings) = (Vec::new(), Vec::new());
-    for normal in normal_walking {
-        let activity = normal.same_channel(gait)?;
-        let squares: f64 = activity.mean.iter().zip(&normal.mean).map(|(a, n)| (a - n).powi(2)).sum();
-        parts.push((squares / normal.mean.len() as f64).sqrt());
-        warnings.extend(doubt(activity, normal));
-    }
-    Ok(EmgRmse { total: parts.iter().sum(), parts, warnings })
 }

@@ -1,7 +1,8 @@
 //! The filters from a raw signal to an envelope: band-pass, rectification, low-pass.
 
-use super::{CycleActivity, EmgRecording, EmgSettings, Envelope, strides_between};
+use super::{CycleActivity, EmgRecording, EmgSettings, Envelope};
 use crate::model_error::ModelError;
+use crate::reference::strides_between;
 use crate::signal_filter::{self, band_pass, low_pass};
 
 impl EmgRecording {

@@ -2,7 +2,7 @@
 
 use super::control_period::CONTROL_PERIOD_S;
 use crate::gait::Gait;
-use crate::gait::motion::instant;
+use crate::gait::between_nodes::instant;
 
 /// Set points and feed-forward torques at one instant.
 #[derive(Debug, Clone, Copy)]

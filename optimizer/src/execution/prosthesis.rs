@@ -22,10 +22,6 @@ const SWING: [Gains; 2] = [Gains::new(250.0, 12.0), Gains::new(15.0, 0.4)];
 /// Time from zero to the largest torque, s (assumption).
 const RISE_S: f64 = 0.04;
 
-/// Smallest planned rate of the hip position that tells the time, m/s.
-const SLOWEST_HIP_M_S: f64 = 0.3;
-/// Smallest planned rate of the thigh angle that tells the time, rad/s.
-const SLOWEST_THIGH_RAD_S: f64 = 1.0;
 /// Share of swing after which a loaded foot has landed.
 const LANDING: f64 = 0.5;
 /// First domain after the lift of the prosthetic foot.
@@ -55,13 +51,6 @@ impl<'a> Prosthesis<'a> {
         }
     }
 
-    /// Linearised hip position over the toe of the prosthesis, m, from its thigh, knee and ankle; also its rate.
-    fn hip_position(&self, thigh: f64, [knee, ankle]: [f64; 2]) -> f64 {
-        let shank = thigh - knee;
-        let foot = shank + ankle;
-        -(self.leg.thigh_length_m * thigh + self.leg.shank_length_m * shank + self.leg.ankle_height_m * foot)
-    }
-
     /// One period of the controller.
     pub(super) fn control(&mut self, measured: &SensorReadings) {
         self.foot.update(measured.load_n);
@@ -72,20 +61,12 @@ impl<'a> Prosthesis<'a> {
         }
         let planned = self.plan.at(self.clock.time_s);
         let (q, qd) = (&planned.q, &planned.qd);
+        let thigh = (q[6] - q[2], qd[6] - qd[2]);
         let phase = if self.clock.time_s < swing_s {
-            StridePhase {
-                measured: self.hip_position(measured.thigh_rad, measured.joints_rad),
-                planned: self.hip_position(q[6] - q[2], [q[7], q[8]]),
-                planned_rate: self.hip_position(qd[6] - qd[2], [qd[7], qd[8]]),
-                slowest: SLOWEST_HIP_M_S,
-            }
+            let joints = ([q[7], q[8]], [qd[7], qd[8]]);
+            StridePhase::of_hip_position(&self.leg, (measured.thigh_rad, measured.joints_rad), thigh, joints)
         } else {
-            StridePhase {
-                measured: measured.thigh_rad,
-                planned: q[6] - q[2],
-                planned_rate: qd[6] - qd[2],
-                slowest: SLOWEST_THIGH_RAD_S,
-            }
+            StridePhase::of_thigh_angle(measured.thigh_rad, thigh)
         };
         self.clock.advance(CONTROL_PERIOD_S, end_s, Some(phase));
         let planned = self.plan.at(self.clock.time_s);

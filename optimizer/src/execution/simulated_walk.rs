@@ -1,11 +1,11 @@
 //! One simulated walk: plant, controllers and disturbance, until the last stride, a fall or a halt.
 
 use super::control_period::CONTROL_PERIOD_S;
-use super::disturbance::{Disturbance, PUSH_DURATION_S};
-use super::human::Human;
+use super::human_joints::Human;
 use super::planned_stride::PlannedStride;
 use super::plant::{AppliedTorques, Plant, PlantMotion};
 use super::prosthesis::Prosthesis;
+use super::random_disturbances::{Disturbance, PUSH_DURATION_S};
 use super::sensors::Sensors;
 use crate::body::WalkerModel;
 use crate::gait::Gait;

@@ -1,8 +1,8 @@
 //! The plant against mechanics, and simulated walks against their contract.
 
-use super::disturbance::{Disturbance, MassChanges, Push};
 use super::ground::YIELD_M;
 use super::plant::{AppliedTorques, Plant, PlantMotion};
+use super::random_disturbances::{Disturbance, MassChanges, Push};
 use super::random_stream::RandomStream;
 use super::simulated_walk::{PLANT_STEPS, SimulatedWalker, WalkEnd};
 use super::terrain::Terrain;

@@ -4,11 +4,17 @@
 //! they agree; where the phase variable stands still or turns round, time alone advances the clock. It never runs
 //! backwards, and it waits at the end of a section for the event that starts the next one.
 
+use crate::body::LegGeometry;
+
 /// Rate at which an error of the phase decays, 1/s.
 const CORRECTION_RATE_1_S: f64 = 30.0;
 /// Largest correction, in seconds per second.
 const LARGEST_CORRECTION: f64 = 1.0;
 
+/// Smallest planned rate of the hip position that tells the time, m/s.
+const SLOWEST_HIP_M_S: f64 = 0.3;
+/// Smallest planned rate of the thigh angle that tells the time, rad/s.
+const SLOWEST_THIGH_RAD_S: f64 = 1.0;
 /// A phase variable: as measured, and as planned at the time of the clock.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StridePhase {
@@ -17,6 +23,36 @@ pub(super) struct StridePhase {
     pub(super) planned_rate: f64,
     /// Magnitude of the planned rate below which the variable does not tell the time.
     pub(super) slowest: f64,
+}
+
+impl StridePhase {
+    /// The linearised hip position over the toe of the prosthesis, m, from its thigh and its knee and ankle. The planned
+    /// angles come with their rates.
+    pub(super) fn of_hip_position(
+        leg: &LegGeometry,
+        measured: (f64, [f64; 2]),
+        (thigh, thigh_rate): (f64, f64),
+        (joints, joint_rates): ([f64; 2], [f64; 2]),
+    ) -> Self {
+        Self {
+            measured: hip_position(leg, measured.0, measured.1),
+            planned: hip_position(leg, thigh, joints),
+            planned_rate: hip_position(leg, thigh_rate, joint_rates),
+            slowest: SLOWEST_HIP_M_S,
+        }
+    }
+
+    /// The angle of the thigh of the prosthesis, rad. The planned angle comes with its rate.
+    pub(super) fn of_thigh_angle(measured: f64, (planned, planned_rate): (f64, f64)) -> Self {
+        Self { measured, planned, planned_rate, slowest: SLOWEST_THIGH_RAD_S }
+    }
+}
+
+/// Linearised hip position over the toe of the prosthesis, m, from its thigh, knee and ankle; also its rate.
+fn hip_position(leg: &LegGeometry, thigh: f64, [knee, ankle]: [f64; 2]) -> f64 {
+    let shank = thigh - knee;
+    let foot = shank + ankle;
+    -(leg.thigh_length_m * thigh + leg.shank_length_m * shank + leg.ankle_height_m * foot)
 }
 
 /// The clock of a controller.

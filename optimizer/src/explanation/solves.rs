@@ -66,8 +66,8 @@ impl FailedSearch {
 
     fn take_in(&mut self, outcome: SolveOutcome) {
         let gave_up = |status: SolveStatus| status != SolveStatus::Infeasible;
-        self.starts += outcome.report.attempts.len();
-        self.undecided |= outcome.report.attempts.iter().any(|attempt| gave_up(attempt.status));
+        self.starts += outcome.report.solver_runs.len();
+        self.undecided |= outcome.report.solver_runs.iter().any(|run| gave_up(run.status));
         let rank = (gave_up(outcome.report.status), outcome.report.max_violation);
         if compared(rank, self.rank).is_lt() {
             (self.rank, self.violations) = (rank, outcome.violations);
@@ -168,7 +168,7 @@ impl<'a> Solves<'a> {
         outcome: SolveOutcome,
         unmet: &mut FailedSearch,
     ) -> Result<bool, SearchEnd> {
-        self.count += outcome.report.attempts.len();
+        self.count += outcome.report.solver_runs.len();
         if self.cancel.is_cancelled() {
             return Err(SearchEnd::Cancelled);
         }

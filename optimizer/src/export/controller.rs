@@ -198,8 +198,9 @@ impl ControllerFile {
             })
             .collect();
         // Prosthetic knee and ankle are the last two coordinates and the last two torques.
-        let column =
-            |value: &dyn Fn(&crate::gait::motion::GaitInstant) -> f64| rows.iter().map(|(_, i)| value(i)).collect();
+        let column = |value: &dyn Fn(&crate::gait::between_nodes::GaitInstant) -> f64| {
+            rows.iter().map(|(_, i)| value(i)).collect()
+        };
         let trajectory = Trajectory {
             rate_hz,
             time_s: rows.iter().map(|(time, _)| *time).collect(),

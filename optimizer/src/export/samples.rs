@@ -1,7 +1,7 @@
 //! A stride sampled at a rate.
 
 use crate::gait::Gait;
-use crate::gait::motion::{GaitInstant, instant};
+use crate::gait::between_nodes::{GaitInstant, instant};
 use crate::model_error::ModelError;
 
 /// Allowed sampling rates, Hz.

@@ -106,7 +106,7 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
     if impulses != expected {
         let found = impulses.map_or_else(|| "is absent".to_owned(), |count| format!("has {count} entries"));
         let wanted = expected.map_or_else(|| "none".to_owned(), |count| count.to_string());
-        return Err(format!("impulse {found}, expected {wanted}"));
+        return Err(format!("impulse {found}; entries expected: {wanted}"));
     }
     let forward = trajectory.phase_end_m > trajectory.phase_start_m;
     if !(forward && trajectory.duration_s > 0.0 && trajectory.duration_s.is_finite()) {

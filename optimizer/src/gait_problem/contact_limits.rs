@@ -3,7 +3,7 @@
 
 use super::foot_clearance::{self, side_of};
 use super::layout::{FORCE, PointVariables, Q, QD};
-use super::mechanics::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
+use super::motion_and_contact_rows::{add_contact_hessian, leg_angles, position_gradient, velocity_angle_gradient};
 use super::program_data::{GaitProgram, PointContext};
 use super::rows::PointRows;
 use super::sparse_entries::Entries;

@@ -5,8 +5,8 @@ use super::elimination_tree::elimination_tree;
 use super::program_data::{GaitProgram, Structure};
 use super::sparse_entries::{Compressed, Entries};
 use super::{
-    contact_limits, fibre_integration, hip_velocity, mechanics, muscle_forces, objective, stride, transitions,
-    virtual_constraint_rows, zero_dynamics_rows,
+    contact_limits, fibre_integration, hip_velocity_rows, motion_and_contact_rows, muscle_forces, objective, stride,
+    transitions, virtual_constraint_rows, zero_dynamics_rows,
 };
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
@@ -78,9 +78,9 @@ impl GaitProgram {
                 let point = self.layout.point_variables(x, d, k);
                 let state = PointState::new(&point.q, &point.qd, &point.qdd);
                 let p = context.layout.point(k);
-                mechanics::jacobian(self, &context, point_rows, &point, &state, p, out);
+                motion_and_contact_rows::jacobian(self, &context, point_rows, &point, &state, p, out);
                 virtual_constraint_rows::jacobian(self, &context, point_rows, &point, x, p, out);
-                hip_velocity::jacobian(&context, point_rows, p, out);
+                hip_velocity_rows::jacobian(&context, point_rows, p, out);
                 contact_limits::jacobian(self, &context, point_rows, &state, x, p, out);
                 muscle_forces::jacobian(self, context.layout, point_rows, &point, p, out);
             }
@@ -100,11 +100,21 @@ impl GaitProgram {
                 let state = PointState::new(&point.q, &point.qd, &point.qdd);
                 let p = context.layout.point(k);
                 let mut link = LinkHessian::default();
-                mechanics::hessian(self, &context, point_rows, &point, &state, p, multipliers, &mut link, out);
+                motion_and_contact_rows::hessian(
+                    self,
+                    &context,
+                    point_rows,
+                    &point,
+                    &state,
+                    p,
+                    multipliers,
+                    &mut link,
+                    out,
+                );
                 contact_limits::hessian(self, &context, point_rows, &state, x, multipliers, &mut link, out);
-                mechanics::write_link_hessian(&link, p, out);
+                motion_and_contact_rows::write_link_hessian(&link, p, out);
                 virtual_constraint_rows::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
-                hip_velocity::hessian(&context, point_rows, multipliers, out);
+                hip_velocity_rows::hessian(&context, point_rows, multipliers, out);
                 muscle_forces::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
             }
             let context = self.domain_context(x, d);
@@ -180,9 +190,9 @@ impl NonlinearProgram for GaitProgram {
                 let context = self.point_context(x, d, k);
                 let point = self.layout.point_variables(x, d, k);
                 let state = PointState::new(&point.q, &point.qd, &point.qdd);
-                mechanics::values(self, &context, point_rows, &point, &state, values);
+                motion_and_contact_rows::values(self, &context, point_rows, &point, &state, values);
                 virtual_constraint_rows::values(self, &context, point_rows, &point, x, values);
-                hip_velocity::values(self, &context, point_rows, &point, x, values);
+                hip_velocity_rows::values(self, &context, point_rows, &point, x, values);
                 contact_limits::values(self, &context, point_rows, &point, &state, x, values);
                 muscle_forces::values(self, point_rows, &point, values);
             }

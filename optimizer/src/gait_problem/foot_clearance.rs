@@ -1,7 +1,7 @@
 //! Rows of C3: heights of heel and toe, on or above the ground, and above the clearance in the swing phase (a5).
 
 use super::layout::Q;
-use super::mechanics::{add_contact_hessian, leg_angles, position_gradient};
+use super::motion_and_contact_rows::{add_contact_hessian, leg_angles, position_gradient};
 use super::program_data::{GaitProgram, PointContext};
 use super::rows::{HeightRow, PointRows};
 use super::sparse_entries::Entries;

@@ -12,7 +12,7 @@ use super::program_data::GaitProgram;
 use super::rows::HeightRow;
 use crate::body::{Axis, COORDINATES, JOINTS, PointState};
 use crate::gait::Gait;
-use crate::gait::motion::{GaitInstant, instant};
+use crate::gait::between_nodes::{GaitInstant, instant};
 use crate::muscle::MUSCLE_COUNT;
 use interior_point::NonlinearProgram;
 

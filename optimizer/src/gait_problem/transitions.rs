@@ -5,7 +5,7 @@
 //! continuous (divided by 3). Fibre lengths are continuous. The impulse of the landing heel is in its friction cone.
 
 use super::layout::{PointVariables, Q, QD};
-use super::mechanics::{axis_index, coupled, leg_angles, position_gradient, subtract_force};
+use super::motion_and_contact_rows::{axis_index, coupled, leg_angles, position_gradient, subtract_force};
 use super::program_data::GaitProgram;
 use super::rows::DomainRows;
 use super::sparse_entries::Entries;

@@ -6,6 +6,7 @@
 //! device or of the settings is stricter than the bound, do not matter. Each constraint depends on one tuned bound only,
 //! so the conditions of several bounds are independent.
 
+use super::active_constraint::{is_active, least_distance};
 use super::foot_clearance::clearance_weight;
 use super::inter_node_check::{BetweenNodes, inter_node_excess};
 use super::margins::Margins;
@@ -19,8 +20,6 @@ use crate::tuned_bounds::TunedBounds;
 use interior_point::{NonlinearProgram, WarmPoint};
 use serde::{Deserialize, Serialize};
 
-/// Smallest distance of an inactive constraint, relative to its bound, or scaled if the bound is less than 1.
-const LEAST_DISTANCE: f64 = 1e-6;
 /// Number of halvings of the allowed range that find the end of an interval, to a share of 1e-12.
 const HALVINGS: usize = 40;
 
@@ -46,17 +45,6 @@ impl UnchangedBound {
     pub fn is_active(&self, value: f64) -> bool {
         [self.least, self.most].contains(&Some(value))
     }
-}
-
-/// Whether a constraint is active at a solution, from its multiplier and its distance from its limit. The one rule for
-/// unchanged bounds and sensitivities.
-pub(crate) fn is_active(distance: f64, multiplier: f64, limit: f64) -> bool {
-    multiplier > distance || distance < least_distance(limit)
-}
-
-/// Smallest distance of an inactive constraint from its limit.
-fn least_distance(limit: f64) -> f64 {
-    LEAST_DISTANCE * limit.abs().max(1.0)
 }
 
 /// A converged gait.

@@ -1,8 +1,10 @@
 //! C3 and C4: bounds of variables and of inequality rows, from the tuned bounds, the device and the settings.
+//! [`super::contact_force_bounds`] has those of contact forces.
 
+use super::contact_force_bounds::contact_force_bounds;
+use super::joint_ranges::joint_ranges;
 use super::layout::{FORCE, Layout, Q, QD, QDD, U};
 use super::rows::RowTable;
-use crate::body::Axis;
 use crate::device::Device;
 use crate::muscle::{MUSCLE_COUNT, Muscle};
 use crate::settings::{GaitLimits, GaitSettings, PerDomainKind};
@@ -49,15 +51,6 @@ fn of_kind(per: &PerDomainKind, kind: DomainKind) -> f64 {
     }
 }
 
-/// Smallest vertical force under the trailing foot, N: it decreases linearly from heel strike to toe-off.
-fn trailing_load(kind: DomainKind, sigma: f64, at_heel_strike_n: f64) -> f64 {
-    match kind {
-        DomainKind::Ds2 => at_heel_strike_n * (1.0 - 0.5 * sigma),
-        DomainKind::Ds3 => at_heel_strike_n * 0.5 * (1.0 - sigma),
-        DomainKind::Ss2 | DomainKind::Ss1 => 0.0,
-    }
-}
-
 /// Bounds of all variables.
 pub fn variable_bounds(
     layout: &Layout,
@@ -75,21 +68,7 @@ pub fn variable_bounds(
         lower[index] = low / layout.scale[index];
         upper[index] = high / layout.scale[index];
     };
-    let torso = bounds.a6.max(limits.torso_tolerance_rad);
-    let hip = bounds.a7.to_radians().min(limits.hip_max_rad);
-    let ankle = bounds.a8.to_radians();
-    let knee = (limits.knee_min_rad, limits.knee_max_rad);
-    let position = [
-        (-10.0, 10.0),
-        (-10.0, 10.0),
-        (-torso, torso),
-        (-hip, hip),
-        knee,
-        (-ankle, ankle),
-        (-hip, hip),
-        knee,
-        (device.ankle_min_rad.max(-ankle), device.ankle_max_rad.min(ankle)),
-    ];
+    let position = joint_ranges(bounds, limits, device);
     let device_speed = bounds.a1.min(device.joint_speed_limit_rad_s);
     let torque = limits.joint_torques_n_m(device);
     for (d, domain) in layout.domains.iter().enumerate() {
@@ -106,20 +85,8 @@ pub fn variable_bounds(
                 set(p + U + i, torque[i].0, torque[i].1);
             }
             for (c, row) in contacts.iter().enumerate() {
-                let largest = limits.contact_force_max_n;
-                let (mut low, mut high) = match row.axis {
-                    Axis::X => (-largest, largest),
-                    Axis::Z => (0.0, largest),
-                };
-                if row.axis == Axis::Z && row.side != CYCLE[d].stance {
-                    low = trailing_load(CYCLE[d].kind, domain.sigma(k), load);
-                }
-                if CYCLE[d].unloading_row() == Some(c) {
-                    low = low.max(limits.liftoff_force_n * (1.0 - domain.sigma(k)));
-                }
-                if k == domain.last() && CYCLE[d].unloaded_rows().contains(&c) {
-                    (low, high) = (0.0, 0.0);
-                }
+                let last = k == domain.last();
+                let (low, high) = contact_force_bounds(limits, CYCLE[d], c, *row, domain.sigma(k), last, load);
                 set(p + FORCE + c, low, high);
             }
             if layout.muscles {

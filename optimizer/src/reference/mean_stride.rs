@@ -1,15 +1,12 @@
 //! From a recording to a reference gait: strides of 101 points, their mean and standard deviation.
 
-use super::heel_strikes::{HeelStrikes, ROUNDING_S};
+use super::heel_strikes::HeelStrikes;
 use super::motion_recording::MotionRecording;
 use super::plausibility::{unlike_builtin, why_implausible};
+use super::recorded_strides::{LONGEST_GAP_S, STRIDE_RANGE_S};
 use super::reference_gait::{MeasuredPerson, REFERENCE_ROWS, ReferenceGait};
 use crate::model_error::ModelError;
 
-/// Durations of valid strides, s.
-pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
-/// Longest gap between two rows of a valid stride, s.
-const LONGEST_GAP_S: f64 = 0.1;
 /// Index of the left knee among the angles of a reference gait.
 const LEFT_KNEE: usize = 2;
 /// Smallest angle by which one thigh is clearly behind the other, rad.
@@ -47,28 +44,7 @@ fn in_words(times: &[f64]) -> String {
     }
 }
 
-/// A stride of a recording, between two right heel strikes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RecordedStride {
-    /// Right heel strike at its start, s.
-    pub start_s: f64,
-    /// Right heel strike at its end, s.
-    pub end_s: f64,
-    /// Whether it is averaged: it lasts as long as strides do, and has no gaps.
-    pub is_used: bool,
-}
-
 impl MotionRecording {
-    /// The strides between heel strikes.
-    pub fn strides(&self, strikes: &[f64]) -> Vec<RecordedStride> {
-        let stride = |pair: &[f64]| {
-            let (start_s, end_s) = (pair[0], pair[1]);
-            let lasts = (STRIDE_RANGE_S.0..=STRIDE_RANGE_S.1).contains(&(end_s - start_s));
-            RecordedStride { start_s, end_s, is_used: lasts && self.is_whole(start_s, end_s) }
-        };
-        strikes.windows(2).map(stride).collect()
-    }
-
     /// The angles at a time, interpolated linearly.
     fn at(&self, time: f64) -> [f64; 5] {
         let after = self.time_s.partition_point(|&t| t < time).clamp(1, self.time_s.len() - 1);
@@ -76,13 +52,6 @@ impl MotionRecording {
         let share = ((time - t0) / (t1 - t0)).clamp(0.0, 1.0);
         let (a, b) = (&self.angles_rad[after - 1], &self.angles_rad[after]);
         std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
-    }
-
-    /// Whether there is no gap between two times.
-    fn is_whole(&self, start: f64, end: f64) -> bool {
-        self.time_s
-            .windows(2)
-            .all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S + ROUNDING_S)
     }
 
     /// The mean stride with its standard deviation, as a reference gait.

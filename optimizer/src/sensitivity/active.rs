@@ -1,7 +1,7 @@
 //! Active constraints of a solution, and how far a parameter can move until they change.
 
 use crate::gait_problem::GaitProgram;
-use crate::gait_problem::unchanged_bounds::is_active;
+use crate::gait_problem::active_constraint::is_active;
 use interior_point::{NonlinearProgram, ParameterDerivative, WarmPoint};
 use serde::Serialize;
 

@@ -1,33 +1,36 @@
-//! Which of several local optima is the outcome of a solve, as an option.
+//! Which of several local optima is the outcome of a solve.
 
-use crate::model_error::ModelError;
-use serde::{Deserialize, Serialize};
+use super::options::LocalOptimumChoice;
+use super::solve_report::SolveStatus;
+use super::solver_runs::{Candidate, FinishedRun};
 
-/// The choice among several converged gaits.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum LocalOptimumChoice {
-    /// The gait with the lowest objective.
-    #[default]
-    LowestObjective,
-    /// The gait with the lowest Gait RMSE among those with an objective near the lowest.
-    NearestToReference {
-        /// Largest excess over the lowest objective, per cent.
-        within_percent: f64,
-    },
-}
-
-impl LocalOptimumChoice {
-    /// Checks the percentage.
-    ///
-    /// # Errors
-    /// [`ModelError::OutOfRange`] with the field.
-    pub fn validate(&self) -> Result<(), ModelError> {
-        match self {
-            Self::LowestObjective => Ok(()),
-            Self::NearestToReference { within_percent } => {
-                ModelError::check_range("local_optimum_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
-            }
+/// Index of the outcome: a cancelled run, otherwise a converged one by `choice`, otherwise the one with the
+/// smallest violation. Among the latter, stationary points of the violation come first, because they show which
+/// constraints conflict.
+pub(super) fn choose(tried: &[FinishedRun], choice: LocalOptimumChoice) -> usize {
+    if let Some(cancelled) = tried.iter().position(|t| t.candidate.status == SolveStatus::Cancelled) {
+        return cancelled;
+    }
+    let converged = || tried.iter().enumerate().filter(|(_, t)| t.candidate.status == SolveStatus::Converged);
+    let least = |key: &dyn Fn(&Candidate) -> f64, limit: f64| {
+        converged()
+            .filter(|(_, t)| t.candidate.objective <= limit)
+            .min_by(|a, b| key(&a.1.candidate).total_cmp(&key(&b.1.candidate)))
+            .map(|(index, t)| (index, t.candidate.objective))
+    };
+    let Some((lowest, objective)) = least(&|c| c.objective, f64::INFINITY) else {
+        let gave_up = |t: &FinishedRun| t.candidate.status != SolveStatus::Infeasible;
+        let violation = |t: &FinishedRun| t.candidate.violation;
+        return tried
+            .iter()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| gave_up(a).cmp(&gave_up(b)).then(violation(a).total_cmp(&violation(b))))
+            .map_or(0, |(index, _)| index);
+    };
+    match choice {
+        LocalOptimumChoice::LowestObjective => lowest,
+        LocalOptimumChoice::NearestToReference { within_percent } => {
+            least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Multi-start: cold starts from several initial guesses, in parallel.
 
-use super::attempts::FinishedAttempt;
 use super::cold_start_guesses::InitialGuess;
 use super::error::SolveError;
-use super::phases::{AttemptRun, SolveContext};
+use super::phases::{RunInProgress, SolveContext};
 use super::progress::IterationRecord;
 use super::solve_report::SolveStatus;
+use super::solver_runs::FinishedRun;
 use crate::gait_problem::margins::Margins;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
@@ -16,18 +16,18 @@ fn try_guess(
     guess: &InitialGuess,
     threads: usize,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<FinishedAttempt, SolveError> {
-    let mut run = AttemptRun::new(context, threads, observer);
+) -> Result<FinishedRun, SolveError> {
+    let mut run = RunInProgress::new(context, threads, observer);
     run.guess = index;
     let result = run.cold(guess)?;
-    Ok(FinishedAttempt::new(context, result, &guess.label(), Margins::default(), &run))
+    Ok(FinishedRun::new(context, result, &guess.label(), Margins::default(), &run))
 }
 
-/// Messages from the threads of the attempts to the calling thread.
+/// Messages from the threads of the runs to the calling thread.
 #[allow(clippy::large_enum_variant)] // A few messages per solve, each moved once.
 enum Message {
     Iteration(IterationRecord),
-    Done(usize, Result<FinishedAttempt, SolveError>),
+    Done(usize, Result<FinishedRun, SolveError>),
 }
 
 /// Tries all guesses, as many in parallel as there are threads. The results have the order of the guesses, the first
@@ -37,14 +37,14 @@ pub(super) fn try_guesses(
     guesses: &[InitialGuess],
     first: usize,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Vec<FinishedAttempt>, SolveError> {
+) -> Result<Vec<FinishedRun>, SolveError> {
     let threads = context.options.threads;
     let workers = threads.min(guesses.len());
     if workers <= 1 {
         return (first..).zip(guesses).map(|(i, guess)| try_guess(context, i, guess, threads, observer)).collect();
     }
     let next = AtomicUsize::new(0);
-    let mut done: Vec<Option<Result<FinishedAttempt, SolveError>>> = guesses.iter().map(|_| None).collect();
+    let mut done: Vec<Option<Result<FinishedRun, SolveError>>> = guesses.iter().map(|_| None).collect();
     std::thread::scope(|scope| {
         let (sender, receiver) = mpsc::channel();
         for _ in 0..workers {
@@ -73,7 +73,7 @@ pub(super) fn try_guesses(
     done.into_iter().flatten().collect()
 }
 
-/// Number of attempts at a stationary point of the violation after which no further guess is tried. With feasible
+/// Number of runs at a stationary point of the violation after which no further guess is tried. With feasible
 /// bounds, so many guesses rarely end there.
 const MOST_INFEASIBLE: usize = 3;
 
@@ -81,7 +81,7 @@ const MOST_INFEASIBLE: usize = 3;
 pub(super) fn try_multi_start(
     context: &SolveContext<'_>,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<Vec<FinishedAttempt>, SolveError> {
+) -> Result<Vec<FinishedRun>, SolveError> {
     let muscles = context.problem.muscles;
     let asked_for = context.options.initial_guesses;
     let guesses = InitialGuess::first(asked_for.max(InitialGuess::MULTI_START.len()), muscles);
@@ -89,7 +89,7 @@ pub(super) fn try_multi_start(
     let mut tried = try_guesses(context, first, 0, observer)?;
     for guess in others.iter().filter(|guess| context.options.retry && InitialGuess::MULTI_START.contains(guess)) {
         let infeasible = tried.iter().filter(|t| t.candidate.status == SolveStatus::Infeasible).count();
-        if tried.iter().any(FinishedAttempt::is_final) || infeasible >= MOST_INFEASIBLE {
+        if tried.iter().any(FinishedRun::is_final) || infeasible >= MOST_INFEASIBLE {
             break;
         }
         tried.extend(try_guesses(context, std::slice::from_ref(guess), tried.len(), observer)?);

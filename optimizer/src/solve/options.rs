@@ -1,7 +1,6 @@
 //! Options of a solve.
 
 use super::cold_start_guesses::InitialGuess;
-use super::local_optimum_choice::LocalOptimumChoice;
 use super::solver_settings;
 use crate::model_error::ModelError;
 use interior_point::NlpSettings;
@@ -16,7 +15,7 @@ pub struct SolveOptions {
     /// Largest number of iterations of each phase; tracking phases have at most 200.
     pub max_iterations: usize,
     /// Largest wall time of the whole solve, s; `None` for no limit. With a limit, equal inputs need not give equal bits:
-    /// the machine's speed decides which attempts and iterations come before it.
+    /// the machine's speed decides which runs and iterations come before it.
     pub time_limit_s: Option<f64>,
     /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result
     /// does not depend on it.
@@ -25,7 +24,7 @@ pub struct SolveOptions {
     pub initial_guesses: usize,
     /// Whether further guesses follow until one converges.
     pub retry: bool,
-    /// The choice among converged attempts.
+    /// The choice among converged runs.
     pub local_optimum_choice: LocalOptimumChoice,
     /// Largest number of rounds in which bounds are tightened if the gait violates them between nodes by more than
     /// half of the limit of the certificate. 0 disables the check.
@@ -69,5 +68,34 @@ impl SolveOptions {
             ModelError::check_range("time_limit_s", limit, 0.0, 1e7)?;
         }
         Ok(())
+    }
+}
+
+/// The choice among several converged gaits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalOptimumChoice {
+    /// The gait with the lowest objective.
+    #[default]
+    LowestObjective,
+    /// The gait with the lowest Gait RMSE among those with an objective near the lowest.
+    NearestToReference {
+        /// Largest excess over the lowest objective, per cent.
+        within_percent: f64,
+    },
+}
+
+impl LocalOptimumChoice {
+    /// Checks the percentage.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] with the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        match self {
+            Self::LowestObjective => Ok(()),
+            Self::NearestToReference { within_percent } => {
+                ModelError::check_range("local_optimum_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
+            }
+        }
     }
 }

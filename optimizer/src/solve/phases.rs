@@ -1,4 +1,4 @@
-//! An attempt in progress: its phases and their cost.
+//! A solver run in progress: its phases and their cost.
 
 use super::cold_start_guesses::{InitialGuess, MuscleRoute};
 use super::error::SolveError;
@@ -38,7 +38,7 @@ const WARM_PUSH: f64 = 1e-7;
 /// it would lead to worse local optima, near the reference gait.
 const PLAIN_BARRIER_SHARE: f64 = 0.1;
 
-/// The common data of all attempts of a solve.
+/// The common data of all solver runs of a solve.
 #[derive(Clone, Copy)]
 pub(super) struct SolveContext<'a> {
     pub(super) problem: &'a GaitProblem,
@@ -48,8 +48,8 @@ pub(super) struct SolveContext<'a> {
     pub(super) started: Instant,
 }
 
-/// An attempt.
-pub(super) struct AttemptRun<'a> {
+/// A solver run.
+pub(super) struct RunInProgress<'a> {
     context: &'a SolveContext<'a>,
     threads: usize,
     observer: &'a mut dyn FnMut(&IterationRecord),
@@ -63,7 +63,7 @@ pub(super) struct AttemptRun<'a> {
     pub(super) reason: String,
 }
 
-impl<'a> AttemptRun<'a> {
+impl<'a> RunInProgress<'a> {
     pub(super) fn new(
         context: &'a SolveContext<'a>,
         threads: usize,
@@ -82,7 +82,7 @@ impl<'a> AttemptRun<'a> {
         }
     }
 
-    /// Time since the start of the attempt, s.
+    /// Time since the start of the run, s.
     pub(super) fn seconds(&self) -> f64 {
         self.begun.elapsed().as_secs_f64()
     }
@@ -142,7 +142,7 @@ impl<'a> AttemptRun<'a> {
         Ok(result)
     }
 
-    /// Whether the attempt was cancelled or reached its time limit.
+    /// Whether the run was cancelled or reached its time limit.
     pub(super) fn interrupted(result: &NlpResult) -> bool {
         matches!(result.status, NlpStatus::Cancelled | NlpStatus::TimeLimit)
     }

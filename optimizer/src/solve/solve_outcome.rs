@@ -1,30 +1,30 @@
-//! The outcome of a solve from its attempts.
+//! The outcome of a solve from its solver runs.
 
-use super::attempts::Candidate;
 use super::gait_results::GaitResults;
 use super::phases::SolveContext;
 use super::solve_report::{
-    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveAttempt, SolveOutcome, SolveReport,
-    SolveStatus, StartedFrom, Violation,
+    CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveOutcome, SolveReport, SolveStatus,
+    SolverRun, StartedFrom, Violation,
 };
+use super::solver_runs::Candidate;
 use super::warm_start::WarmStart;
 use crate::gait_problem::margins::Margins;
 use crate::gait_problem::{ConvergedGait, GaitProgram, RowViolation};
 use interior_point::{NlpResult, NonlinearProgram};
 
-/// Total cost of the attempts of a solve.
+/// Total cost of the runs of a solve.
 #[derive(Default)]
 pub(super) struct SolveTally {
     pub(super) iterations: usize,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra: LinearAlgebra,
-    pub(super) attempts: Vec<SolveAttempt>,
+    pub(super) solver_runs: Vec<SolverRun>,
 }
 
 /// Largest number of reported violations.
 const MAX_VIOLATIONS: usize = 20;
 
-/// The outcome of the chosen attempt.
+/// The outcome of the chosen run.
 pub(super) fn outcome(
     context: &SolveContext<'_>,
     candidate: Candidate,
@@ -78,7 +78,7 @@ pub(super) fn outcome(
         stride_length_m: results.stride_length_m,
         durations_s: results.durations_s,
         vhip_m_s: results.vhip_m_s,
-        attempts: tally.attempts,
+        solver_runs: tally.solver_runs,
     };
     // NaN is a violation.
     let above = violations.iter().filter(|v| v.amount.is_nan() || v.amount > CONVERGED_VIOLATION);
@@ -90,13 +90,13 @@ pub(super) fn outcome(
 pub(super) fn other_local_optimum(
     context: &SolveContext<'_>,
     candidate: Candidate,
-    attempt: &SolveAttempt,
+    run: &SolverRun,
     local_optimum: usize,
 ) -> OtherLocalOptimum {
     OtherLocalOptimum {
         local_optimum,
-        objective: attempt.objective,
-        gait_rmse_rad: attempt.gait_rmse_rad,
+        objective: run.objective,
+        gait_rmse_rad: run.gait_rmse_rad,
         warm_start: warm_start(context, &candidate.result, Margins::default()),
         gait: candidate.gait,
     }

@@ -52,12 +52,12 @@ pub enum StartedFrom {
     ColdAfterWarm,
 }
 
-/// An attempt of a solve.
+/// One run of the solver within a solve, from an initial guess or a warm start.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SolveAttempt {
+pub struct SolverRun {
     /// Label of the start.
     pub strategy: String,
-    /// Status of the attempt.
+    /// Status of the run.
     pub status: SolveStatus,
     /// Number of iterations over its phases.
     pub iterations: usize,
@@ -67,10 +67,10 @@ pub struct SolveAttempt {
     pub objective: f64,
     /// Final Gait RMSE, rad.
     pub gait_rmse_rad: f64,
-    /// The reason why the attempt could not be completed; empty otherwise.
+    /// The reason why the run could not be completed; empty otherwise.
     #[serde(default)]
     pub reason: String,
-    /// Number of its local optimum, from 1 in the order of the attempts. Attempts with the same number have the same
+    /// Number of its local optimum, from 1 in the order of the runs. Runs with the same number have the same
     /// gait. `None` if it did not converge.
     #[serde(default)]
     pub local_optimum: Option<usize>,
@@ -90,7 +90,7 @@ pub struct Optimality {
     pub barrier: f64,
 }
 
-/// Cost of the linear algebra of a solve, over all attempts.
+/// Cost of the linear algebra of a solve, over all runs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Default)]
 pub struct LinearAlgebra {
     /// Time of the symbolic analyses, one for each phase, s.
@@ -120,7 +120,7 @@ impl LinearAlgebra {
         });
     }
 
-    /// Adds the cost of another attempt.
+    /// Adds the cost of another run.
     pub(super) fn add(&mut self, other: &Self) {
         self.seconds_analysis += other.seconds_analysis;
         self.seconds_factorisation += other.seconds_factorisation;
@@ -166,7 +166,7 @@ pub struct SolveReport {
     pub unchanged_bounds: Vec<UnchangedBound>,
     /// Wall time, s.
     pub seconds_total: f64,
-    /// Time of function and derivative evaluations, s. This and the following times are sums over attempts, which may
+    /// Time of function and derivative evaluations, s. This and the following times are sums over runs, which may
     /// exceed the wall time.
     pub seconds_evaluation: f64,
     /// Time of the linear algebra, s.
@@ -188,9 +188,9 @@ pub struct SolveReport {
     pub durations_s: [f64; 8],
     /// v_hip of the four sequences of domains without impact, m/s.
     pub vhip_m_s: [f64; 4],
-    /// The attempts in order. Iterations and times above are sums, the other values are those of the chosen attempt.
+    /// The runs in order. Iterations and times above are sums, the other values are those of the chosen run.
     #[serde(default)]
-    pub attempts: Vec<SolveAttempt>,
+    pub solver_runs: Vec<SolverRun>,
 }
 
 /// A violated constraint row or bound.
@@ -207,7 +207,7 @@ pub struct Violation {
 /// Another local optimum that a guess of the solve reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OtherLocalOptimum {
-    /// Number of the local optimum among the attempts.
+    /// Number of the local optimum among the runs.
     pub local_optimum: usize,
     /// Objective.
     pub objective: f64,

@@ -1,10 +1,10 @@
 //! Figures for download: a drawing as self-contained SVG, or its values as CSV.
 
 use super::chart::Chart;
-use super::gait_tiles;
 use super::heat_map::HeatMap;
 use super::parallel::Parallel;
 use super::standalone::{self, Inside};
+use super::stride_pictures;
 use super::tree::Tree;
 use super::walker::Animation;
 use crate::csv_table::{CsvTable, cells};
@@ -86,7 +86,8 @@ impl Figure {
                 standalone::svg(self.title(), &inside, &chart.legend())
             }
             Drawing::Tiles(title, figures) => {
-                let inside = Inside { class: "tiles", size: gait_tiles::SIZE, body: gait_tiles::body(figures) };
+                let inside =
+                    Inside { class: "tiles", size: stride_pictures::SIZE, body: stride_pictures::body(figures) };
                 standalone::svg(title, &inside, &[])
             }
             Drawing::Animation(title, animation) => {

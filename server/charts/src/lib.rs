@@ -15,7 +15,6 @@ mod figure;
 pub mod gait_charts;
 pub mod gait_series;
 pub mod gait_table;
-mod gait_tiles;
 mod heat_map;
 mod parallel;
 #[cfg(feature = "png")]
@@ -25,13 +24,13 @@ mod series;
 mod simplified;
 mod sparkline;
 mod standalone;
+mod stride_pictures;
 mod tree;
 mod walker;
 
 pub use axis::power_of_ten;
 pub use chart::{Chart, LegCycle, Span};
 pub use figure::{Drawing, Figure};
-pub use gait_tiles::gait_tiles;
 pub use heat_map::{HeatMap, Tile};
 pub use parallel::{Parallel, ParallelAxis, ParallelLine};
 #[cfg(feature = "png")]
@@ -41,5 +40,6 @@ pub use reference_band::{band_in_words, over_reference};
 pub use series::{Band, PointLink, Series, Stroke};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;
+pub use stride_pictures::stride_pictures;
 pub use tree::{Tree, TreeNode};
 pub use walker::{Animation, GaitWalker, Ghost};

@@ -165,6 +165,13 @@ class Description(unittest.TestCase):
                     client.sent = ("GET", inspect.getgeneratorlocals(answer)["path"])
                 self.assertEqual(client.sent, (verb.upper(), path), operation["operationId"])
 
+    def test_every_type_can_be_read_while_the_program_runs(self) -> None:
+        document = json.loads(DESCRIPTION.read_text(encoding="utf-8"))
+        operations = [operation for item in document["paths"].values() for operation in item.values()]
+        for operation in operations:
+            hints = typing.get_type_hints(getattr(Client, operation["operationId"]))
+            self.assertIn("return", hints, operation["operationId"])
+
 
 if __name__ == "__main__":
     unittest.main()

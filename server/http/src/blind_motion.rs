@@ -31,7 +31,7 @@ pub(crate) fn blind_motion(gait: &Gait, phase: f64) -> Result<Vec<BlindStickFigu
 pub(crate) fn blind_stride(gait: &Gait, phase: f64) -> Result<Vec<StickFigure>, Error> {
     let figures = stick_figures(gait)?;
     let (Some(first), Some(last)) = (figures.first(), figures.last()) else {
-        return Err(Error::Internal("a gait without any nodes".to_owned()));
+        return Err(Error::Internal("the gait has no nodes".to_owned()));
     };
     let (stride_s, stride_m) = (last.time_s - first.time_s, last.hip[0] - first.hip[0]);
     let origin = between(&figures, first.time_s + stride_s * phase).hip[0];

@@ -130,7 +130,7 @@ pub(super) fn remove(headers: &mut HeaderMap) {
 }
 
 fn unreadable(what: &str, value: &str) -> Error {
-    Error::Malformed(format!("A header of the reverse proxy is malformed: {what} is {value:?}."))
+    Error::Malformed(format!("A header of the reverse proxy is malformed: the value of `{what}` is {value:?}."))
 }
 
 /// The comma-separated parts of all lines of a header. An empty part is a hop of its own: without it, the last hop could

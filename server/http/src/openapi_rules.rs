@@ -9,7 +9,7 @@ use super::openapi_descriptions;
 use super::openapi_schemas::{Schemas, merge};
 use super::openapi_settings::settings;
 use super::openapi_solver_settings;
-use super::resources::documents;
+use super::resources::document_schemas;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
@@ -157,7 +157,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         schemas.add("Dimension", "values", &values);
         schemas.add("Dimension", "lengthscale", &json!({ "minimum": 1e-15, "maximum": 1e15 }));
         schemas.add("SearchSpace", "dimensions", &json!({ "minItems": 1, "maxItems": TunedBounds::NAMES.len() }));
-        for component in ["Dimension", "SearchSpace"].into_iter().chain(documents::CLOSED) {
+        for component in ["Dimension", "SearchSpace"].into_iter().chain(document_schemas::CLOSED) {
             schemas.close(component);
         }
         state_bounds(schemas);

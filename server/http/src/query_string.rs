@@ -68,13 +68,15 @@ fn refusal(path: &str, message: &str, pairs: &Pairs) -> Error {
         let known = known.trim_start_matches("one of ").replace(" or ", ", ");
         return unknown(field, value(field), known.split(", "));
     }
-    let allowed = if ["invalid type", "invalid value", "unknown variant"].iter().any(|start| message.starts_with(start))
-    {
+    let allowed = if message.starts_with("invalid value: integer") {
+        json_document::expected(message)
+    } else if ["invalid type", "invalid value", "unknown variant"].iter().any(|start| message.starts_with(start)) {
         expected()
     } else if message.starts_with("UUID parsing failed") {
         "an identifier".to_owned()
     } else {
-        message.to_owned()
+        // The words of a reader of its own can be a whole refusal.
+        message.rsplit_once("it must be ").map_or(message, |(_, allowed)| allowed).trim_end_matches('.').to_owned()
     };
     let value = value(path).unwrap_or_default();
     Error::Invalid(Box::new(FieldError {
@@ -102,7 +104,10 @@ impl<'de> IntoDeserializer<'de, Refused> for Text<'de> {
 
 impl<'de> Text<'de> {
     fn parsed<T: FromStr, V: Visitor<'de>>(self, visitor: &V) -> Result<T, Refused> {
-        self.0.parse().map_err(|_| Refused::invalid_type(Unexpected::Str(self.0), visitor))
+        self.0.parse().map_err(|_| match self.0.parse() {
+            Ok(number) => Refused::invalid_value(Unexpected::Unsigned(number), visitor),
+            Err(_) => Refused::invalid_type(Unexpected::Str(self.0), visitor),
+        })
     }
 
     fn plain(self) -> StrDeserializer<'de, Refused> {

@@ -17,7 +17,11 @@ pub(super) async fn check(request: Request, next: Next) -> Result<Response, Refu
     let reads = matches!(*request.method(), Method::GET | Method::HEAD | Method::OPTIONS);
     let secure = request.extensions().get::<Secure>().copied().unwrap_or_default();
     if !reads && !is_ours(request.headers(), secure) {
-        return Err(Error::Forbidden("Requests from another origin are refused.".to_owned()).into());
+        return Err(Error::Forbidden(
+            "This request comes from another origin, so it was refused. Open the page on this service and try again."
+                .to_owned(),
+        )
+        .into());
     }
     Ok(next.run(request).await)
 }

@@ -164,7 +164,7 @@ pub enum Error {
     #[error(transparent)]
     Store(StoreError),
     /// A command cannot write its output.
-    #[error("Cannot write to standard output: {0}.")]
+    #[error("Cannot write the output: {0}.")]
     Output(std::io::Error),
     /// The disk is full.
     #[error("{0}")]

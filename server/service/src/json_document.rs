@@ -92,15 +92,26 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
         }
         _ => expected(message),
     };
+    // The words of a reader of its own need not complete the sentence "it must be ...".
+    let is_sentence = allowed == message || message.starts_with("solver.");
     let message = match (missing, twice) {
         (Some(_), _) => format!("The field {field} is missing{place}."),
         (_, Some(_)) => format!("The field {field} occurs twice{place}."),
+        _ if is_sentence => format!("The field {field} is invalid{place}: {message}."),
         _ if message.starts_with("unknown field") => {
-            format!("The field {field} is unknown{place}. Known fields: {}.", allowed.trim_start_matches("one of "))
+            format!(
+                "The field {field} is unknown{place}. Known fields: {}.",
+                allowed.trim_start_matches("one of ").replace(" or ", ", ")
+            )
         }
         _ => format!("The field {field} is {}{place}; it must be {allowed}.", shortened(&value)),
     };
-    Error::Unreadable(Box::new(FieldError { message, field, value: Some(value), allowed: Some(allowed) }))
+    Error::Unreadable(Box::new(FieldError {
+        message,
+        field,
+        value: Some(value),
+        allowed: (!is_sentence).then_some(allowed),
+    }))
 }
 
 /// Line and column in words. The second pass, which reads values, has no position, so the position of the field is
@@ -175,13 +186,19 @@ fn value_at(bytes: &[u8], path: &Path) -> Value {
 /// The expected type in plain words, from the message of a deserialiser.
 pub fn expected(message: &str) -> String {
     let Some((_, expected)) = message.split_once("expected ") else { return message.to_owned() };
+    let is_too_large = message.starts_with("invalid value: integer `") && !message.contains("integer `-");
     match expected {
+        "u8" if is_too_large => format!("a whole number of at most {}", u8::MAX),
+        "u16" if is_too_large => format!("a whole number of at most {}", u16::MAX),
+        "u32" if is_too_large => format!("a whole number of at most {}", u32::MAX),
+        "i32" if message.starts_with("invalid value") => format!("a whole number from {} to {}", i32::MIN, i32::MAX),
         "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number of at least 0".to_owned(),
         "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
         "f32" | "f64" => "a number".to_owned(),
         "a boolean" => "true or false".to_owned(),
-        "a string" => "a string".to_owned(),
         "a sequence" => "a list".to_owned(),
+        "a map" => "an object".to_owned(),
+        "a string" | "string or map" => "a string".to_owned(),
         other if other.starts_with("struct ") => OBJECT.to_owned(),
         other => other.replace('`', ""),
     }

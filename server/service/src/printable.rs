@@ -69,7 +69,7 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
     const LONGEST: usize = 2000;
     let text = text.trim();
     if text.is_empty() {
-        return Err(Error::invalid(field, text, &format!("1 to {LONGEST} characters{what}")));
+        return Err(Error::invalid(field, text, &format!("1 to {LONGEST} characters long{what}")));
     }
     note(field, text, LONGEST)?;
     Ok(text)
@@ -103,7 +103,7 @@ mod tests {
             assert!(refusal.contains(why), "{refusal}");
         }
         assert_eq!(reason("reason", " scuffed ", "").unwrap(), "scuffed");
-        assert!(reason("reason", " \n", ": why").unwrap_err().to_string().contains("1 to 2000 characters: why"));
+        assert!(reason("reason", " \n", ": why").unwrap_err().to_string().contains("1 to 2000 characters long: why"));
     }
 
     #[test]

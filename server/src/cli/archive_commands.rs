@@ -1,9 +1,9 @@
 //! `gaitwright export`, `gaitwright import` and `gaitwright signing-key`.
 
 use super::database_file::{exists, note_export};
+use super::input_file::read;
 use super::out_file::OutFile;
 use super::output::data;
-use super::problem_flags::read;
 use super::settings::{AnchoredFlags, RecordFlags, Settings};
 use clap::Args;
 use gaitwright_service::error::Error;

@@ -2,7 +2,7 @@
 
 use super::gait_file::{GaitFile, read_gait_file};
 use super::output::data;
-use super::problem_flags::reference_of;
+use super::problem_files::reference_of;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, RECOVERY_STRIDES, STRIDES, certify};
 use gait_optimizer::{Gait, GaitResults, ReferenceGait, SolveReport};

@@ -1,6 +1,16 @@
-//! How a command ends that did not fail with an error.
+//! How a command ends, and its exit code.
 
-/// How a command ended.
+use super::output::tell;
+use gaitwright_service::error::Error;
+use std::process::ExitCode;
+
+/// Exit code for invalid input, as for every usage error.
+const INPUT_FAULT: u8 = 2;
+
+/// Exit code after Ctrl-C or SIGTERM, as in shells.
+const INTERRUPTED: u8 = 130;
+
+/// How a command ended that did not fail with an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum CommandEnd {
     /// It succeeded.
@@ -9,4 +19,21 @@ pub(super) enum CommandEnd {
     Interrupted,
     /// Part of it failed because of the program or the machine.
     Failed,
+}
+
+impl CommandEnd {
+    pub(super) fn exit_code(self) -> ExitCode {
+        match self {
+            Self::Done => ExitCode::SUCCESS,
+            Self::Interrupted => ExitCode::from(INTERRUPTED),
+            Self::Failed => ExitCode::FAILURE,
+        }
+    }
+}
+
+/// Reports an error. Returns the exit code of the command that it ended.
+pub(super) fn report(error: &Error) -> ExitCode {
+    tell(&format!("gaitwright: {error}"));
+    let wrong_file = matches!(error, Error::Store(error) if error.is_wrong_file());
+    if error.is_input() || wrong_file { ExitCode::from(INPUT_FAULT) } else { ExitCode::FAILURE }
 }

@@ -3,9 +3,9 @@
 use super::flag_choices::{EMG_FORMATS, one_of};
 use super::flag_names::of_flags;
 use super::flag_numbers::{filter_order, number};
+use super::input_file::read;
 use super::out_file::OutFile;
 use super::output::data;
-use super::problem_flags::read;
 use clap::Args;
 use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
 use gaitwright_charts::csv_table::{CsvCell, CsvTable};

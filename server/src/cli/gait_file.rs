@@ -1,6 +1,6 @@
 //! Reads a gait from a file of `solve --out`, or from a gait file of the service.
 
-use super::problem_flags::read;
+use super::input_file::read;
 use gait_optimizer::{Gait, SolveOutcome, SolveReport};
 use gaitwright_service::error::Error;
 use gaitwright_service::json_document;

@@ -113,7 +113,7 @@ impl LineageStart {
 
 /// The local optimum whose gait is the result of a solve.
 pub(super) fn chosen_local_optimum(report: &SolveReport) -> Option<usize> {
-    report.attempts.iter().find(|attempt| attempt.chosen).and_then(|attempt| attempt.local_optimum)
+    report.solver_runs.iter().find(|run| run.chosen).and_then(|run| run.local_optimum)
 }
 
 #[cfg(test)]

@@ -18,12 +18,14 @@ mod flag_choices;
 mod flag_names;
 mod flag_numbers;
 mod gait_file;
+mod input_file;
 mod interruption;
 mod lineage;
 mod logging;
 mod multi_start_flags;
 mod out_file;
 mod output;
+mod problem_files;
 mod problem_flags;
 mod prune;
 mod reference;
@@ -38,23 +40,17 @@ mod sweep;
 #[cfg(feature = "tls")]
 mod tls;
 mod tune;
-mod unattended;
+mod unattended_study;
 mod users;
 mod worker;
 
 use clap::{Parser, Subcommand};
-use command_end::CommandEnd;
+use command_end::{CommandEnd, report};
 use gaitwright_http::openapi;
 use gaitwright_service::error::Error;
 use output::{data, tell};
 use settings::{AnchoredFlags, Flags, RecordFlags, Settings, unknown_variables};
 use std::process::ExitCode;
-
-/// Exit code for invalid input, as for every usage error.
-const INPUT_FAULT: u8 = 2;
-
-/// Exit code after Ctrl-C or SIGTERM, as in shells.
-const INTERRUPTED: u8 = 130;
 
 /// Tunes walking gaits for powered prostheses by preference learning.
 ///
@@ -203,15 +199,7 @@ pub fn run() -> ExitCode {
         Command::Prune(prune) => runtime.block_on(prune.run(&settings)).map(|()| CommandEnd::Done),
     };
     match done {
-        Ok(CommandEnd::Done) => ExitCode::SUCCESS,
-        Ok(CommandEnd::Interrupted) => ExitCode::from(INTERRUPTED),
-        Ok(CommandEnd::Failed) => ExitCode::FAILURE,
+        Ok(end) => end.exit_code(),
         Err(error) => report(&error),
     }
-}
-
-fn report(error: &Error) -> ExitCode {
-    tell(&format!("gaitwright: {error}"));
-    let wrong_file = matches!(error, Error::Store(error) if error.is_wrong_file());
-    if error.is_input() || wrong_file { ExitCode::from(INPUT_FAULT) } else { ExitCode::FAILURE }
 }

@@ -2,100 +2,15 @@
 
 use super::flag_names::of_flags;
 use super::flag_numbers::{iterations, number};
+use super::input_file::read_document;
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
+use super::problem_files::ProblemFiles;
 use super::subject_flags::{SubjectFlags, Switch};
 use clap::Args;
-use gait_optimizer::NlpSettings;
-use gait_optimizer::{
-    Device, GaitProblem, GaitSettings, Mesh, OtherLocalOptimum, ReferenceGait, SolveOptions, SolveOutcome, TunedBounds,
-};
+use gait_optimizer::{GaitProblem, Mesh, OtherLocalOptimum, SolveOptions, SolveOutcome, TunedBounds};
 use gaitwright_service::error::Error;
-use gaitwright_service::json_document;
-use gaitwright_service::studies::device;
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
-use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-/// Files that replace parts of the built-in problem.
-#[derive(Debug, Clone, Args)]
-pub(super) struct ProblemFiles {
-    /// JSON device file (default: the built-in AMPRO3).
-    #[arg(long, value_name = "FILE")]
-    device: Option<PathBuf>,
-    /// Settings of the gait problem that differ from the defaults (JSON), as in
-    /// {"limits": {"speed_min_m_s": 1.1}, "muscles": {"sol": {"max_force_n": 3500}}}.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
-    /// Reference gait: `falisse-2019` (one adult), `fukuchi-2018` (median of 24 adults), or a JSON file written by
-    /// `gaitwright reference` (default: falisse-2019).
-    #[arg(long, value_name = "NAME or FILE")]
-    reference: Option<PathBuf>,
-    /// Settings of the interior-point method that differ from the defaults (JSON), as in {"bound_push": 0.01,
-    /// "linear_solver": "delayed_pivots"}. An unknown name is refused with a list of the known ones.
-    #[arg(long, value_name = "FILE")]
-    solver_settings: Option<PathBuf>,
-}
-
-impl ProblemFiles {
-    pub(super) fn device(&self) -> Result<Device, Error> {
-        Ok(match &self.device {
-            Some(path) => read_document(path, "a device file", device::check)?,
-            None => Device::ampro3()?,
-        })
-    }
-
-    /// The settings of the gait problem, validated.
-    pub(super) fn settings(&self) -> Result<GaitSettings, Error> {
-        Ok(match &self.settings {
-            Some(path) => read_document(path, "a file of gait settings", |read: &GaitSettings| Ok(read.validate()?))?,
-            None => GaitSettings::default(),
-        })
-    }
-
-    /// The default options, with the given settings of the interior-point method.
-    pub(super) fn options(&self) -> Result<SolveOptions, Error> {
-        match &self.solver_settings {
-            Some(path) => options_with_solver(&read(path)?)
-                .map_err(|e| Error::Malformed(format!("{} is not a file of solver settings: {e}", path.display()))),
-            None => Ok(SolveOptions::default()),
-        }
-    }
-
-    pub(super) fn reference(&self) -> Result<ReferenceGait, Error> {
-        reference_of(self.reference.as_deref())
-    }
-}
-
-/// Options with the solver settings of a document.
-fn options_with_solver(text: &str) -> Result<SolveOptions, Error> {
-    // Parsed alone first, so that errors name the field and its position.
-    json_document::read::<NlpSettings>(text.as_bytes())?;
-    let solver: Value = json_document::read(text.as_bytes())?;
-    let options: SolveOptions =
-        serde_json::from_value(json!({ "solver": solver })).map_err(|e| Error::Malformed(e.to_string()))?;
-    options.validate()?;
-    Ok(options)
-}
-
-/// The built-in reference gait of this name, or the one in this file; without either the default one.
-pub(super) fn reference_of(path: Option<&Path>) -> Result<ReferenceGait, Error> {
-    let Some(path) = path else { return Ok(ReferenceGait::builtin()?) };
-    if let Some((_, builtin)) = ReferenceGait::all_builtin()?.into_iter().find(|(name, _)| path.as_os_str() == *name) {
-        return Ok(builtin);
-    }
-    if let Err(error) = std::fs::metadata(path)
-        && error.kind() == std::io::ErrorKind::NotFound
-    {
-        let names: Vec<&str> = ReferenceGait::all_builtin()?.into_iter().map(|(name, _)| name).collect();
-        return Err(Error::Malformed(format!(
-            "There is no reference gait {}. Give the name of a built-in one ({}) or an existing file.",
-            path.display(),
-            names.join(", ")
-        )));
-    }
-    read_document(path, "a reference gait", |read: &ReferenceGait| Ok(read.validate()?))
-}
 
 #[derive(Debug, Clone, Args)]
 pub(super) struct ProblemFlags {
@@ -137,8 +52,7 @@ impl ProblemFlags {
 
     /// The input files.
     pub(super) fn inputs(&self) -> Vec<&Path> {
-        let ProblemFiles { device, settings, reference, solver_settings } = &self.files;
-        [device, settings, reference, solver_settings, &self.warm].into_iter().flatten().map(PathBuf::as_path).collect()
+        self.files.paths().chain(self.warm.as_deref()).collect()
     }
 
     pub(super) fn options(&self) -> Result<SolveOptions, Error> {
@@ -184,25 +98,6 @@ impl ProblemFlags {
 struct FileLineage {
     #[serde(default)]
     lineage: Option<Lineage>,
-}
-
-pub(super) fn read(path: &Path) -> Result<String, Error> {
-    let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("Cannot read {}: {e}.", path.display())))?;
-    String::from_utf8(bytes).map_err(|error| {
-        let readable = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = readable.split(|byte| *byte == b'\n').count();
-        Error::Malformed(format!("{}, line {line}, is not valid UTF-8. Save the file as UTF-8.", path.display()))
-    })
-}
-
-/// Reads and checks a JSON file. Errors name the file.
-pub(super) fn read_document<T: DeserializeOwned>(
-    path: &Path,
-    what: &str,
-    check: impl Fn(&T) -> Result<(), Error>,
-) -> Result<T, Error> {
-    let read = json_document::read(read(path)?.as_bytes()).and_then(|read| check(&read).map(|()| read));
-    read.map_err(|e| Error::Malformed(format!("{} is not {what}: {e}", path.display())))
 }
 
 fn parse_mesh(text: &str) -> Result<Mesh, String> {

@@ -3,9 +3,9 @@
 use super::flag_choices::{ANGLE_UNITS, HEEL_STRIKES, JOINT_ANGLE_FORMATS, one_of};
 use super::flag_names::of_flags;
 use super::flag_numbers::number;
+use super::input_file::read;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::read;
 use clap::Args;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferenceGait, Strikes, Unit};

@@ -3,12 +3,13 @@
 use super::command_end::CommandEnd;
 use super::cores::cores_or;
 use super::flag_numbers::local_optimum;
+use super::input_file::read_document;
 use super::interruption::cancelled_by_signal;
 use super::lineage::{Lineage, LineageStart, chosen_local_optimum};
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::{ProblemFlags, read_document};
+use super::problem_flags::ProblemFlags;
 use super::reference_comparison;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
@@ -20,8 +21,8 @@ use gait_optimizer::{
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::problem_file::SolveInput;
 use gaitwright_service::studies::sensitivities::refusal;
-use gaitwright_service::studies::solve_input::SolveInput;
 use indicatif::ProgressBar;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -262,7 +263,7 @@ fn for_people(
     lines.join("\n")
 }
 
-/// The time of all attempts by task.
+/// The time of all runs by task.
 fn linear_algebra_in_words(report: &SolveReport) -> Vec<String> {
     let Some(algebra) = &report.linear_algebra else { return Vec::new() };
     let fallbacks = match algebra.fallbacks {
@@ -300,18 +301,18 @@ fn lineage_in_words(report: &SolveReport, lineage: &Lineage, start: Option<&Line
     lines
 }
 
-/// The local optima, if there are several, each as found by its first attempt.
+/// The local optima, if there are several, each as found by its first run.
 fn local_optima_in_words(report: &SolveReport) -> Vec<String> {
     let answer = chosen_local_optimum(report);
     let mut lines: Vec<String> = Vec::new();
-    for attempt in &report.attempts {
-        let Some(local_optimum) = attempt.local_optimum.filter(|local_optimum| *local_optimum > lines.len()) else {
+    for run in &report.solver_runs {
+        let Some(local_optimum) = run.local_optimum.filter(|local_optimum| *local_optimum > lines.len()) else {
             continue;
         };
-        let chosen = if attempt.local_optimum == answer { ", chosen" } else { "" };
+        let chosen = if run.local_optimum == answer { ", chosen" } else { "" };
         lines.push(format!(
             "  local optimum {local_optimum:<5}objective {:.5}   Gait RMSE {:.4} rad{chosen}",
-            attempt.objective, attempt.gait_rmse_rad
+            run.objective, run.gait_rmse_rad
         ));
     }
     if lines.len() > 1 { lines } else { Vec::new() }

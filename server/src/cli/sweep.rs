@@ -4,10 +4,11 @@
 use super::command_end::CommandEnd;
 use super::cores::cores_or;
 use super::flag_numbers::workers;
+use super::input_file::read;
 use super::interruption::cancelled_by_signal;
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::{ProblemFlags, read};
+use super::problem_flags::ProblemFlags;
 use super::solve::status_word;
 use clap::Args;
 use gait_optimizer::{

@@ -6,17 +6,17 @@ use super::flag_choices::{WARM_STARTS, one_of};
 use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
-use super::problem_flags::ProblemFiles;
+use super::problem_files::ProblemFiles;
 use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{SubjectFlags, Switch};
-use super::unattended::{self, Lines, action_line};
+use super::unattended_study::{self, Lines, action_line};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::certified_best::CertificateState;
+use gaitwright_service::studies::recommended_trial::best_trial;
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::summary::{self, Summary};
-use gaitwright_service::studies::trial_choice::best_trial;
 use gaitwright_service::studies::{built_in_entries, device, reference_import};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::commit;
@@ -84,9 +84,9 @@ impl TuneCommand {
             warm_start_from: self.warm_start_from,
             ..NewStudy::of(subject.id)
         };
-        let study = Box::pin(unattended::study(&store, new)).await?;
+        let study = Box::pin(unattended_study::study(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
-        let ran = Box::pin(unattended::run_and_certify(&mut store, &study, workers, lines)).await;
+        let ran = Box::pin(unattended_study::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;
         let (ran, certification) = ran?;
         let (snapshot, analyses) = (ran.snapshot.clone(), Arc::clone(&ran.analyses));
@@ -104,7 +104,7 @@ impl TuneCommand {
             ));
             return Ok(CommandEnd::Interrupted);
         }
-        match unattended::failure(&ran.snapshot) {
+        match unattended_study::failure(&ran.snapshot) {
             None => Ok(CommandEnd::Done),
             Some(failure) => {
                 tell(&format!("gaitwright: {failure}"));

@@ -2,7 +2,7 @@
 //! them to the access log.
 
 use super::access_log::{Access, Tally};
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::{Instant, StoreError, StoreResult};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};

@@ -10,7 +10,7 @@ use super::connection::Connection;
 use super::error::{StoreError, StoreResult};
 use super::json_columns;
 use super::lost_files::FileId;
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::time::{Instant, now};
 use serde::{Deserialize, Serialize};
 use sqlx::{AssertSqlSafe, Row};

@@ -52,7 +52,7 @@ impl TryFrom<OrderedAnswer> for AssessmentAnswer {
             OrderedAnswer::UnsafeSecond => Ok(Self::UnsafeB),
             OrderedAnswer::UnsafeBoth => Ok(Self::UnsafeBoth),
             OrderedAnswer::First | OrderedAnswer::Second | OrderedAnswer::NoDifference | OrderedAnswer::Retracted => {
-                Err(StoreError::Damaged { what: "assessment answer", reason: answer.as_str().to_owned() })
+                Err(StoreError::unknown_value("assessment answer", answer.as_str()))
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Backups of the record: consistent while the service is running, and verified.
 
 use super::atomic_file::folder_of;
-use super::record_files::free_name;
+use super::record_file_names::free_name;
 use super::verified_copy::{cannot_write, whole_copy};
 use super::{Store, StoreError, StoreResult, read_only};
 use sqlx::SqlitePool;

@@ -1,8 +1,8 @@
 //! The folder of scheduled backups. It belongs to one record, because the oldest backups in it are removed.
 
 use super::atomic_file::private;
-use super::record_files::free_name;
-use super::record_files::path_with_suffix;
+use super::record_file_names::free_name;
+use super::record_file_names::path_with_suffix;
 use super::{Store, StoreError, StoreResult, backup};
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};

@@ -11,8 +11,8 @@ pub type StoreResult<T> = Result<T, StoreError>;
 pub enum StoreError {
     /// The file cannot be opened or created.
     #[error(
-        "Cannot open the database {}: {source}. The file and its folder must be writable, because the -wal, -shm and .lock \
-         files are kept there.",
+        "Cannot open or write {}: {source}. The file and its folder must be writable; the folder of a database also holds its \
+         -wal, -shm and .lock files.",
         path.display()
     )]
     Open {
@@ -233,7 +233,7 @@ pub enum StoreError {
     #[error("The database is closed because the service is shutting down.")]
     Closed,
     /// A change could not be written to the disk, and was rolled back.
-    #[error("The change could not be written to the disk: {0}.")]
+    #[error("The change could not be written to the disk: {}.", .0.trim_end_matches('.'))]
     NotDurable(String),
     /// The free space has shrunk to the reserve, so nothing large is started.
     #[error(
@@ -245,6 +245,17 @@ pub enum StoreError {
         /// Reserve, MB.
         reserve_mb: u64,
     },
+    /// A stored text is none of the known values of its column.
+    #[error(
+        "The record is damaged ({what}): unknown value {text:?}. Run `gaitwright audit verify`, then restore a backup with \
+         `gaitwright restore`."
+    )]
+    UnknownValue {
+        /// What was read.
+        what: &'static str,
+        /// The text.
+        text: String,
+    },
     /// Any other error of the database.
     #[error("The database failed: {0}.")]
     Database(#[from] sqlx::Error),
@@ -253,10 +264,20 @@ pub enum StoreError {
 impl StoreError {
     /// A stored text that is none of the known values of its column.
     pub(super) fn unknown_value(what: &'static str, text: &str) -> Self {
-        let reason = format!(
-            "unknown value {text:?}. Run `gaitwright audit verify`, then restore a backup with `gaitwright restore`"
-        );
-        Self::Damaged { what, reason }
+        Self::UnknownValue { what, text: text.to_owned() }
+    }
+
+    /// What was found, for data that are not those of the record: without the advice for a damaged record.
+    pub fn finding(&self) -> String {
+        match self {
+            Self::Damaged { what, reason } => format!("{what}: {reason}"),
+            Self::UnknownValue { what, text } => format!("{what}: unknown value {text:?}"),
+            Self::Unsealed { table, key } => {
+                format!("row {key} of {table} has no seal, so this program did not write it")
+            }
+            Self::Database(error) => format!("the database refused it: {error}"),
+            other => other.to_string().trim_end_matches('.').to_owned(),
+        }
     }
 
     /// Whether the change was refused, here or by a trigger, because the subject withdrew consent.

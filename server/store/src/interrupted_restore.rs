@@ -3,7 +3,7 @@
 
 use super::anchor::{self, ChainEnds};
 use super::atomic_file::{WholeFile, sync_folder};
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::{StoreError, StoreResult, json_columns};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

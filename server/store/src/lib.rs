@@ -55,7 +55,7 @@ mod opening_checks;
 mod ownership;
 pub mod quarantine;
 pub mod read_only;
-mod record_files;
+mod record_file_names;
 pub mod reference_gaits;
 pub mod restore;
 pub mod rights;
@@ -63,6 +63,7 @@ pub mod safety_reports;
 pub mod safety_reviews;
 mod schema_versions;
 pub mod seals;
+mod second_writer;
 pub mod sessions;
 pub mod sign_in_failures;
 pub mod solve_jobs;
@@ -99,6 +100,7 @@ use gaitwright_compute::{ComputeError, OnPool, Pool};
 use lost_files::RecordFiles;
 use opening_checks::{check_history, refuse_empty_in_place_of_record, refuse_unchanged};
 use ownership::Ownership;
+use sqlx::ConnectOptions as _;
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 use std::path::{Path, PathBuf};
@@ -207,7 +209,9 @@ impl Store {
             .foreign_keys(true)
             .busy_timeout(Duration::from_secs(10))
             // Each table has its own statements for seals.
-            .statement_cache_capacity(400);
+            .statement_cache_capacity(400)
+            // The schema is one long statement, which a slow disk would print as a warning.
+            .log_slow_statements(log::LevelFilter::Debug, Duration::from_secs(1));
         // Few rows ahead, because the verification reads rows that contain whole measurement files.
         let one = options.clone().row_buffer_size(quarantine::ROWS_AHEAD);
         let only = SqlitePoolOptions::new().max_connections(1).connect_with(one).await?;
@@ -216,7 +220,7 @@ impl Store {
             only.close().await;
             return Err(refused);
         }
-        let version = writer::data_version(&mut *only.acquire().await?).await?;
+        let version = second_writer::data_version(&mut *only.acquire().await?).await?;
         migrations::apply(&only, path).await?;
         if let Some(newest) = audit::newest(&mut *only.acquire().await?).await? {
             time::never_before(newest);

@@ -2,7 +2,7 @@
 //! file, and all acknowledged changes would be lost with the process.
 
 use super::error::{StoreError, StoreResult};
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::wal_check::Log;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Migrates a record at start, in one transaction, after a backup.
 
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::schema_versions::{FILES, SchemaFile, check_version, migrator};
 use super::verified_copy::whole_copy;
 use super::{StoreError, StoreResult, seals, verify};

@@ -1,7 +1,7 @@
 //! Checks of a file before it is opened as a record: not another program's, not an earlier state, not an empty file in
 //! place of a record.
 
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::{StoreError, StoreResult, anchor, schema_versions};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};

@@ -4,7 +4,7 @@
 use super::atomic_file::private;
 use super::error::{StoreError, StoreResult};
 use super::lost_files::FileId;
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! Opens and checks a record without changing it.
 
-use super::record_files::path_with_suffix;
+use super::record_file_names::path_with_suffix;
 use super::{StoreError, StoreResult, interrupted_restore, quarantine, schema_versions, sqlite_file};
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use sqlx::{Row, SqlitePool};

@@ -7,8 +7,8 @@
 use super::atomic_file::WholeFile;
 use super::interrupted_restore::{COMPANIONS, Marker, RestoreStep, finish, finish_interrupted, hash_of, mark};
 use super::ownership::Ownership;
-use super::record_files::free_name;
-use super::record_files::path_with_suffix;
+use super::record_file_names::free_name;
+use super::record_file_names::path_with_suffix;
 use super::verified_copy::{self, whole_copy};
 use super::{StoreError, StoreResult, anchor, read_only};
 use std::fs::File;

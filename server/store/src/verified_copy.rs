@@ -18,8 +18,11 @@ pub(super) async fn whole_copy(pool: &SqlitePool, from: &Path, to: &Path, family
     })?;
     match verify::file(copy.part(), &[]).await {
         Ok(_) => Ok(copy),
-        Err(error @ (StoreError::Damaged { .. } | StoreError::Unsealed { .. })) => {
-            Err(StoreError::Unverified { path: from.to_owned(), reason: error.to_string() })
+        Err(error @ (StoreError::Damaged { .. } | StoreError::UnknownValue { .. } | StoreError::Unsealed { .. })) => {
+            Err(StoreError::Unverified {
+                path: from.to_owned(),
+                reason: format!("It has this fault: {}.", error.finding()),
+            })
         }
         Err(error) => Err(error),
     }

@@ -7,6 +7,7 @@
 use super::anchor::{self, Anchors};
 use super::free_disk_space::Space;
 use super::lost_files::RecordFiles;
+use super::second_writer;
 use super::{StoreError, StoreResult};
 use sqlx::{Connection as _, Row as _, SqliteConnection};
 use std::ops::{Deref, DerefMut};
@@ -65,16 +66,6 @@ pub(super) struct Outside {
 impl Outside {
     fn check(&self) -> StoreResult<()> {
         self.files.as_ref().map_or(Ok(()), |files| files.check())
-    }
-
-    /// [`Self::check`], and refuses a record that another program has changed since the last call. Called after the
-    /// beginning of a transaction, when no other program can write.
-    async fn check_alone(&self, connection: &mut SqliteConnection, seen: Option<i64>) -> StoreResult<i64> {
-        let version = data_version(connection).await?;
-        match &self.files {
-            Some(files) if seen.is_some_and(|seen| seen != version) => Err(files.refuse_second_writer()),
-            _ => Ok(version),
-        }
     }
 
     /// [`Self::check`], and verifies the log after a commit. Returns the number of frames.
@@ -283,7 +274,7 @@ async fn begin(line: LentConnection, shared: Arc<Shared>) -> StoreResult<Writer>
         }
         run(&mut connection, "begin immediate").await?;
         let seen = shared.state().version;
-        match shared.outside.check_alone(&mut connection, seen).await {
+        match second_writer::refuse(&mut connection, shared.outside.files.as_deref(), seen).await {
             Ok(version) => shared.state().version = Some(version),
             Err(error) => {
                 let _ = run(&mut connection, "rollback").await;
@@ -322,11 +313,6 @@ async fn keep_flushing(line: LentConnection, shared: Arc<Shared>) {
             None => return,
         }
     }
-}
-
-/// A number that differs from the last one if another connection has committed in between.
-pub(super) async fn data_version(connection: &mut SqliteConnection) -> StoreResult<i64> {
-    Ok(sqlx::query_scalar("pragma data_version").fetch_one(connection).await?)
 }
 
 /// Number of frames in the write-ahead log.

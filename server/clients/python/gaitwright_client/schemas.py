@@ -2889,32 +2889,6 @@ class SimulatedWalksOnGround(TypedDict):
     simulated_walks: int
 
 
-class _SolveAttemptRequired(TypedDict):
-    # Whether its gait is the result of the solve.
-    chosen: bool
-    # Gait RMSE where it ended, rad.
-    gait_rmse_rad: float
-    # Iterations over its phases.
-    iterations: int
-    # Objective where it ended.
-    objective: float
-    # Reason if it could not be completed; otherwise empty.
-    reason: str
-    # Wall time, s.
-    seconds: float
-    # How it ended.
-    status: SolveStatus
-    # Starting point and method in words, such as `warm start`.
-    strategy: str
-
-
-class SolveAttempt(_SolveAttemptRequired, total=False):
-    """One attempt within a solve, from one starting point."""
-
-    # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
-    local_optimum: Optional[int]
-
-
 class SolveOptionsLocalOptimumChoiceNearestToReference(TypedDict):
     """Takes the local optimum with the lowest Gait RMSE."""
 
@@ -2996,8 +2970,6 @@ class SolveProblem(_SolveProblemRequired, total=False):
 
 
 class _SolveReportRequired(TypedDict):
-    # All attempts, in order.
-    attempts: list[SolveAttempt]
     # Mechanical cost of transport, dimensionless.
     cost_of_transport: float
     # Durations of the eight domains, s.
@@ -3022,6 +2994,8 @@ class _SolveReportRequired(TypedDict):
     seconds_linear_algebra: float
     # Wall time, s.
     seconds_total: float
+    # All solver runs, in order.
+    solver_runs: list[SolverRun]
     # Mean walking speed, m/s.
     speed_m_s: float
     # What it started from.
@@ -3048,6 +3022,32 @@ class SolveReport(_SolveReportRequired, total=False):
     linear_algebra: Optional[LinearAlgebra]
     # How well the conditions of a local optimum are met. Null if unknown.
     optimality: Optional[Optimality]
+
+
+class _SolverRunRequired(TypedDict):
+    # Whether its gait is the result of the solve.
+    chosen: bool
+    # Gait RMSE where it ended, rad.
+    gait_rmse_rad: float
+    # Iterations over its phases.
+    iterations: int
+    # Objective where it ended.
+    objective: float
+    # Reason if it could not be completed; otherwise empty.
+    reason: str
+    # Wall time, s.
+    seconds: float
+    # How it ended.
+    status: SolveStatus
+    # Starting point and method in words, such as `warm start`.
+    strategy: str
+
+
+class SolverRun(_SolverRunRequired, total=False):
+    """One run of the solver within a solve, from an initial guess or a warm start."""
+
+    # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
+    local_optimum: Optional[int]
 
 
 class StateChangeReason(TypedDict, total=False):

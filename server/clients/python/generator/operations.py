@@ -170,8 +170,7 @@ class Operation:
 def imports(operations: list[Operation], words: list[str]) -> list[str]:
     """The imports of a module with these words."""
     unpack = "Unpack" in words
-    typing = ["TYPE_CHECKING"] if unpack else []
-    typing += [name for name in ("Literal", "Optional", "Union", "cast") if name in words]
+    typing = [name for name in ("Literal", "Optional", "Union", "cast") if name in words]
     lines = ["from collections.abc import Iterator"] if "Iterator" in words else []
     lines += [f"from typing import {', '.join(typing)}", ""] if typing else [""] if lines else []
     if "Event" in words:
@@ -181,8 +180,7 @@ def imports(operations: list[Operation], words: list[str]) -> list[str]:
     used = sorted(set().union(*(operation.used for operation in operations)))
     lines += ["from ..schemas import (", *(f"    {name}," for name in used), ")"] if used else []
     lines.append("from ..transport import Transport")
-    if unpack:
-        lines += ["", "if TYPE_CHECKING:", "    from typing_extensions import Unpack"]
+    lines += ["from ..unpack import Unpack"] if unpack else []
     return lines
 
 

@@ -7,7 +7,7 @@ use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
 use crate::resources::devices::Device;
-use crate::resources::documents;
+use crate::resources::document_schemas;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
@@ -45,7 +45,7 @@ pub(super) async fn list(
     path = "/devices",
     operation_id = "create_device",
     tag = "devices",
-    request_body(content = documents::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
+    request_body(content = document_schemas::DeviceDefinition, description = "A device file, as `/help/data-files` describes it"),
     responses(
         (status = 200, description = "Existing device with the same definition", body = Device),
         (status = 201, description = "Device", body = Device)

@@ -5,7 +5,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::problem_details::Refusal;
-use crate::resources::documents;
+use crate::resources::document_schemas;
 use crate::resources::emg::EmgView;
 use crate::visible::Visible;
 use axum::Json;
@@ -24,7 +24,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields, default)]
 pub(super) struct EmgProcessing {
     /// band_low_hz, band_high_hz, envelope_hz and order. Absent settings take their default values.
-    #[schema(value_type = documents::EmgSettings)]
+    #[schema(value_type = document_schemas::EmgSettings)]
     settings: EmgSettings,
 }
 

@@ -7,7 +7,7 @@ use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::problem_details::Refusal;
-use crate::resources::documents;
+use crate::resources::document_schemas;
 use crate::visible::Visible;
 use axum::extract::State;
 use axum::response::Response;
@@ -15,7 +15,7 @@ use gait_optimizer::export;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::solve_input::PackedInput;
+use gaitwright_service::studies::problem_file::PackedInput;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::{TrialId, consents, gaits, trials};
 use serde::Deserialize;
@@ -42,7 +42,7 @@ pub(super) fn default_rate_hz() -> f64 {
     operation_id = "get_solve_problem",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    responses((status = 200, description = "Input for `gaitwright solve --problem`", body = documents::SolveProblem), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Input for `gaitwright solve --problem`", body = document_schemas::SolveProblem), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn problem(
@@ -93,7 +93,7 @@ pub(super) async fn motion_file(
     operation_id = "get_controller_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
-    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = documents::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent")),
+    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = document_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn controller(

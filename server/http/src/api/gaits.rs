@@ -4,7 +4,7 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::csv_response::csv_file;
 use crate::problem_details::Refusal;
-use crate::resources::documents;
+use crate::resources::document_schemas;
 use crate::visible::Visible;
 use axum::extract::State;
 use axum::http::header;
@@ -23,7 +23,7 @@ use gaitwright_store::{StoreError, TrialId, gaits, trials};
     operation_id = "get_gait",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
-    responses((status = 200, description = "Gait", body = documents::GaitDocument), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Gait", body = document_schemas::GaitDocument), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(

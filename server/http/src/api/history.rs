@@ -14,8 +14,8 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::recommended_trial::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::ranking_to_show;
 use gaitwright_store::{StudyId, studies};
 use std::sync::Arc;
 

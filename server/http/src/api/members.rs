@@ -12,6 +12,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Administer, Read, Run};
 use gaitwright_service::studies::membership::{self, NewMember};
+use gaitwright_service::studies::rater_invitation;
 use gaitwright_store::{MemberId, StudyId, members};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -208,7 +209,7 @@ pub(super) async fn invite(
     IdempotentWith(request, whom): IdempotentWith<Administer, RaterInvitation>,
 ) -> Result<Response, Refusal> {
     let mut writer = request.begin_secret(&app).await?;
-    let (_, member, secret) = membership::invite(&mut writer, &request.actor, id, &whom.name).await?;
+    let (_, member, secret) = rater_invitation::invite(&mut writer, &request.actor, id, &whom.name).await?;
     let location = address(member.id);
     let invited = CreatedRaterInvitation { member: member.into(), path: format!("/sign-in/{secret}") };
     request.created(&app, writer, location, &invited).await

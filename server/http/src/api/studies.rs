@@ -15,7 +15,9 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::{StudyTransition, transitions_for_people};
-use gaitwright_service::studies::study_change::{self, StudyChange, StudyClone, StudyExtension};
+use gaitwright_service::studies::study_change::{self, StudyChange};
+use gaitwright_service::studies::study_clone::{self, StudyClone};
+use gaitwright_service::studies::study_extension::{self, StudyExtension};
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::studies::{self, StudyFilter, StudyState};
 use gaitwright_store::{BorrowedWriter, Connection, StudyId, SubjectId, trials};
@@ -319,7 +321,7 @@ pub(super) async fn extend(
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let study = study_change::extend(&mut writer, &request.actor, id, &more).await?;
+    let study = study_extension::extend(&mut writer, &request.actor, id, &more).await?;
     let revision = study.revision;
     let view = StudyView::of(&mut writer, study).await?;
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
@@ -347,7 +349,7 @@ pub(super) async fn clone_study(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = study_change::clone_study(&mut writer, &request.actor, id, &differs).await?;
+    let study = study_clone::clone_study(&mut writer, &request.actor, id, &differs).await?;
     made(&app, &request, writer, study).await
 }
 

@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
-use crate::resources::documents;
+use crate::resources::document_schemas;
 use crate::resources::subjects::{Consent, Correction, Subject};
 use crate::visible::Visible;
 use axum::Json;
@@ -219,7 +219,7 @@ pub(super) async fn correct(
     operation_id = "get_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "Identifier of the subject")),
-    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = documents::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Measured values, in the format of `gait_settings.muscles` of a study", body = document_schemas::MuscleParameters), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn muscles(
@@ -241,8 +241,8 @@ pub(super) async fn muscles(
     operation_id = "set_subject_muscles",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "Identifier of the subject")),
-    request_body(content = documents::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the default values"),
-    responses((status = 200, description = "Muscle values", body = documents::MuscleParameters)),
+    request_body(content = document_schemas::MuscleParameters, description = "Measured values, in the format of `gait_settings.muscles` of a study. An empty object means the default values"),
+    responses((status = 200, description = "Muscle values", body = document_schemas::MuscleParameters)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn set_muscles(

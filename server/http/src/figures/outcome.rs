@@ -5,8 +5,8 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::history::{self, Milestone};
 use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
+use gaitwright_service::studies::recommended_trial::{last_known_best, ranking_to_show};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::trial_choice::{last_known_best, ranking_to_show};
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::{AnswerSource, StudyState};
 

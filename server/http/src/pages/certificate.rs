@@ -94,7 +94,7 @@ impl FormattedCheck {
 }
 
 /// The job that makes the certificate of a gait.
-pub(super) enum Certification {
+pub(super) enum CertificateJob {
     /// There is none.
     None,
     /// It is queued or running.
@@ -105,7 +105,7 @@ pub(super) enum Certification {
     Failed(String),
 }
 
-impl Certification {
+impl CertificateJob {
     pub(super) fn of(job: Option<(JobState, Option<String>)>) -> Self {
         match job {
             None | Some((JobState::Done, _)) => Self::None,

@@ -1,6 +1,6 @@
 //! The page of a trial and its gait.
 
-use super::certificate::{self, Certification};
+use super::certificate::{self, CertificateJob};
 use super::explanation::{FeasibleRelaxation, NoGait};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
@@ -51,7 +51,7 @@ struct GaitPage {
     may_run: bool,
     certificate: Option<certificate::InWords>,
     /// The job that makes the certificate.
-    certification: Certification,
+    certification: CertificateJob,
     /// Simulated walks, for a converged gait.
     walks: Option<SimulatedWalks>,
     /// Whether the page offers the sensitivities of a converged gait, which take a second.
@@ -180,7 +180,7 @@ pub(super) async fn get(
         summary,
         may_run,
         certificate,
-        certification: Certification::of(app.scheduler.certifying(id)),
+        certification: CertificateJob::of(app.scheduler.certifying(id)),
         walks,
         offers_sensitivities: converged && sensitivities.is_none(),
         sensitivities,

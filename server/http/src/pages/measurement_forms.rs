@@ -138,12 +138,29 @@ fn pairs(text: &str) -> Result<BTreeMap<String, String>, Error> {
     text.split(',').filter(|part| !part.trim().is_empty()).map(pair).collect()
 }
 
-fn list<T: FromStr>(field: &str, text: &str) -> Result<Vec<T>, Error> {
+/// A type of number with its name in errors.
+trait NamedNumber: FromStr {
+    const NAME: &'static str;
+}
+
+impl NamedNumber for f64 {
+    const NAME: &'static str = "a number";
+}
+
+impl NamedNumber for u32 {
+    const NAME: &'static str = "a whole number of at least 0";
+}
+
+impl NamedNumber for usize {
+    const NAME: &'static str = "a whole number of at least 0";
+}
+
+fn list<T: NamedNumber>(field: &str, text: &str) -> Result<Vec<T>, Error> {
     text.split(',').filter(|part| !part.trim().is_empty()).map(|part| number(field, part)).collect()
 }
 
-fn number<T: FromStr>(field: &str, text: &str) -> Result<T, Error> {
-    text.trim().parse().map_err(|_| Error::invalid(field, text, "a number"))
+fn number<T: NamedNumber>(field: &str, text: &str) -> Result<T, Error> {
+    text.trim().parse().map_err(|_| Error::invalid(field, text, T::NAME))
 }
 
 fn optional(field: &str, text: &str) -> Result<Option<f64>, Error> {

@@ -19,6 +19,7 @@ use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterReliability, Share};
 use gaitwright_service::studies::membership::{self, NewMember, StudyAccess};
+use gaitwright_service::studies::rater_invitation;
 use gaitwright_store::members::{Member, MemberKind};
 use gaitwright_store::studies::Study;
 use gaitwright_store::{MemberId, StudyId, Writer, commit, consents, studies};
@@ -197,7 +198,7 @@ async fn apply(
             Ok(None)
         }
         "invite" if caller.may(Administer::NEEDED) => {
-            let (user, _, secret) = membership::invite(writer, &caller.actor, study, &form.name).await?;
+            let (user, _, secret) = rater_invitation::invite(writer, &caller.actor, study, &form.name).await?;
             Ok(Some((user.name, secret)))
         }
         "invite" => Err(Error::Forbidden("Only administrators can create sign-in links.".to_owned())),

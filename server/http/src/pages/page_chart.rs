@@ -1,6 +1,6 @@
 //! Charts as pages show them.
 
-use gaitwright_charts::{Chart, Drawing, Figure, gait_tiles};
+use gaitwright_charts::{Chart, Drawing, Figure, stride_pictures};
 
 /// A chart ready for the page.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl PageChart {
         ];
         let (svg, legend) = match &figure.drawing {
             Drawing::Chart(chart) => return Self { files, ..Self::new(chart) },
-            Drawing::Tiles(_, stick_figures) => (gait_tiles(stick_figures), Vec::new()),
+            Drawing::Tiles(_, stick_figures) => (stride_pictures(stick_figures), Vec::new()),
             // Pages show the walker itself, which a script moves.
             Drawing::Animation(..) => (String::new(), Vec::new()),
             Drawing::Map(map) => (map.svg(), Vec::new()),

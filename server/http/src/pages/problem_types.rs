@@ -21,6 +21,6 @@ pub(super) async fn list() -> PageResult {
 
 /// `GET /problems/{name}`.
 pub(super) async fn get(Path(name): Path<String>) -> PageResult {
-    let kind = ProblemKind::named(&name).ok_or(Error::NotFound { what: "kind of problem".to_owned(), id: name })?;
+    let kind = ProblemKind::named(&name).ok_or(Error::NotFound { what: "problem type".to_owned(), id: name })?;
     page(&ProblemsPage { entries: vec![kind.entry()], one: true })
 }

@@ -13,7 +13,7 @@ use axum::extract::{Path, State};
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::Gait;
 use gait_optimizer::gait::stick_figure::StickFigure;
-use gaitwright_charts::gait_tiles;
+use gaitwright_charts::stride_pictures;
 use gaitwright_service::access::{Caller, Rate, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::blind::{self, RaterAnswer};
@@ -121,7 +121,7 @@ struct ShownStride {
 impl ShownStride {
     fn of(figures: &[StickFigure]) -> Option<Self> {
         let seconds = figures.last()?.time_s - figures.first()?.time_s;
-        Some(Self { seconds: format!("{seconds:.2}"), picture: gait_tiles(figures) })
+        Some(Self { seconds: format!("{seconds:.2}"), picture: stride_pictures(figures) })
     }
 }
 

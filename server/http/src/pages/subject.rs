@@ -218,7 +218,10 @@ async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form:
     let mut writer = app.write().await?;
     let newest = consents::of_subject(&mut writer, id).await?.last().map_or(0, |last| last.seq);
     if newest != form.after {
-        return Err(Error::conflict("Consent was recorded or withdrawn after this form was loaded. Check it first."));
+        return Err(Error::conflict(
+            "Nothing was changed, because consent was recorded or withdrawn after this form was loaded. Check the consent on \
+             this page, then send the form again.",
+        ));
     }
     consent::give(&mut writer, &authorized.caller.actor, id, &NewConsent { form: form.form }).await?;
     Ok(commit(writer).await?)
@@ -309,7 +312,10 @@ async fn set_right(
     let mut writer = app.write().await?;
     let newest = subjects::corrections(&mut writer, id).await?.last().map_or(0, |last| last.seq);
     if newest != form.before {
-        return Err(Error::conflict("Height and mass were corrected after this form was loaded. Check them first."));
+        return Err(Error::conflict(
+            "Nothing was changed, because height and mass were corrected after this form was loaded. Check the values on this \
+             page, then send the form again.",
+        ));
     }
     subject::correct(&mut writer, &authorized.caller.actor, id, &new).await?;
     Ok(commit(writer).await?)

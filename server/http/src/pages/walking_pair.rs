@@ -2,7 +2,7 @@
 
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ModelError};
-use gaitwright_charts::{GaitWalker, gait_tiles};
+use gaitwright_charts::{GaitWalker, stride_pictures};
 use gaitwright_store::TrialId;
 
 /// One gait of the pair.
@@ -27,7 +27,7 @@ pub(super) fn walking_pair([a, b]: [(TrialId, u32, String, &Gait); 2]) -> Result
     let shown = |(trial, number, name, gait): (TrialId, u32, String, &Gait), walker: &GaitWalker| {
         Ok::<_, ModelError>(WalkingGait {
             walker: walker.svg(&format!("{name}, walking")),
-            tiles: gait_tiles(&stick_figures(gait)?),
+            tiles: stride_pictures(&stick_figures(gait)?),
             has_muscles: gait.muscles,
             trial,
             number,

@@ -1,6 +1,6 @@
 //! Rows of the audit trail.
 
-use super::documents;
+use super::document_schemas;
 use gaitwright_store::{Instant, audit};
 use serde::Serialize;
 use serde_json::Value;
@@ -20,7 +20,7 @@ pub(crate) struct AuditRow {
     /// What was changed, such as `study 0190...`.
     object: String,
     /// Details of the change, with the reason if there is one.
-    #[schema(value_type = documents::AuditDetail)]
+    #[schema(value_type = document_schemas::AuditDetail)]
     detail: Value,
     /// Hash of the previous row.
     previous: String,

@@ -1,6 +1,6 @@
 //! Devices.
 
-use super::documents;
+use super::document_schemas;
 use gait_optimizer::Device as Definition;
 use gaitwright_store::{DeviceId, Instant, devices};
 use serde::Serialize;
@@ -14,7 +14,7 @@ pub(crate) struct Device {
     /// Name shown to users.
     name: String,
     /// Definition of the device.
-    #[schema(value_type = documents::DeviceDefinition)]
+    #[schema(value_type = document_schemas::DeviceDefinition)]
     definition: Definition,
     /// Time of creation.
     created_at: Instant,

@@ -1,6 +1,6 @@
 //! Processed EMG of lab sessions.
 
-use super::documents;
+use super::document_schemas;
 use gait_optimizer::emg::{self, EmgSettings};
 use gaitwright_service::studies::lab;
 use gaitwright_store::MeasurementFileId;
@@ -103,7 +103,7 @@ impl From<lab::WalkActivity> for WalkActivity {
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct EmgResult {
     /// Settings of the filters.
-    #[schema(value_type = documents::EmgSettings)]
+    #[schema(value_type = document_schemas::EmgSettings)]
     settings: EmgSettings,
     /// Walks with an EMG recording.
     walks: Vec<WalkActivity>,

@@ -13,7 +13,7 @@ pub(crate) mod assessments;
 pub(crate) mod audit;
 pub(crate) mod certificates;
 pub(crate) mod devices;
-pub(crate) mod documents;
+pub(crate) mod document_schemas;
 pub(crate) mod emg;
 pub(crate) mod events;
 pub(crate) mod execution_reports;

@@ -1,6 +1,6 @@
 //! Reference gaits.
 
-use super::documents;
+use super::document_schemas;
 use gait_optimizer::ReferenceGait as Definition;
 use gaitwright_service::studies::nearest_reference;
 use gaitwright_store::{Instant, ReferenceGaitId, reference_gaits};
@@ -15,7 +15,7 @@ pub(crate) struct ReferenceGait {
     /// Name shown to users.
     name: String,
     /// Definition of the reference gait.
-    #[schema(value_type = documents::ReferenceGaitDocument)]
+    #[schema(value_type = document_schemas::ReferenceGaitDocument)]
     definition: Definition,
     /// Time of creation.
     created_at: Instant,

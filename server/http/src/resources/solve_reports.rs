@@ -116,8 +116,8 @@ pub(crate) struct SolveReport {
     /// Hip velocity in the four intervals between impacts, m/s.
     #[schema(value_type = Vec<f64>)]
     vhip_m_s: [f64; 4],
-    /// All attempts, in order.
-    attempts: Vec<SolveAttempt>,
+    /// All solver runs, in order.
+    solver_runs: Vec<SolverRun>,
 }
 
 impl From<gait_optimizer::SolveReport> for SolveReport {
@@ -145,7 +145,7 @@ impl From<gait_optimizer::SolveReport> for SolveReport {
             stride_length_m,
             durations_s,
             vhip_m_s,
-            attempts,
+            solver_runs,
         } = report;
         Self {
             status: status.into(),
@@ -170,7 +170,7 @@ impl From<gait_optimizer::SolveReport> for SolveReport {
             stride_length_m,
             durations_s,
             vhip_m_s,
-            attempts: attempts.into_iter().map(Into::into).collect(),
+            solver_runs: solver_runs.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -193,9 +193,9 @@ impl From<gait_optimizer::UnchangedBound> for UnchangedBound {
     }
 }
 
-/// One attempt within a solve, from one starting point.
+/// One run of the solver within a solve, from an initial guess or a warm start.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct SolveAttempt {
+pub(crate) struct SolverRun {
     /// Starting point and method in words, such as `warm start`.
     strategy: String,
     /// How it ended.
@@ -218,9 +218,9 @@ pub(crate) struct SolveAttempt {
     chosen: bool,
 }
 
-impl From<gait_optimizer::SolveAttempt> for SolveAttempt {
-    fn from(attempt: gait_optimizer::SolveAttempt) -> Self {
-        let gait_optimizer::SolveAttempt {
+impl From<gait_optimizer::SolverRun> for SolverRun {
+    fn from(run: gait_optimizer::SolverRun) -> Self {
+        let gait_optimizer::SolverRun {
             strategy,
             status,
             iterations,
@@ -230,7 +230,7 @@ impl From<gait_optimizer::SolveAttempt> for SolveAttempt {
             reason,
             local_optimum,
             chosen,
-        } = attempt;
+        } = run;
         Self {
             strategy,
             status: status.into(),

@@ -24,7 +24,8 @@ pub fn check(password: &str, name: &str) -> Result<(), Error> {
     let length = password.chars().count();
     if length < SHORTEST || password.len() > LONGEST_BYTES {
         let allowed = format!("at least {SHORTEST} characters and at most {LONGEST_BYTES} bytes long");
-        return Err(FieldError::described("password", &format!("{length} characters long"), &allowed).into());
+        let characters = if length == 1 { "character" } else { "characters" };
+        return Err(FieldError::described("password", &format!("{length} {characters} long"), &allowed).into());
     }
     let known: Vec<&str> = name.split_whitespace().chain([name]).chain(LIKELY.iter().copied()).collect();
     if zxcvbn(password, &known).guesses_log10() < FEWEST_GUESSES {

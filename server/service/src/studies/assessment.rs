@@ -106,7 +106,7 @@ pub async fn retract(
         ));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, ", the reason for the retraction")?;
+    let reason = printable::reason("reason", reason, " and say why the answer is retracted")?;
     if !assessments::retract(writer, id, author, reason).await? {
         return Err(Error::conflict("This assessment was already retracted."));
     }

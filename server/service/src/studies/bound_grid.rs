@@ -59,7 +59,7 @@ impl RequestedSearchSpace {
                 Err(Error::invalid(
                     &format!("{FIELD}[{at}].values"),
                     values,
-                    &format!("a list of increasing values ({reason})"),
+                    &format!("a valid list of values ({reason})"),
                 ))
             }
             Err(LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest }) => {
@@ -194,7 +194,7 @@ mod tests {
         assert!(message.contains("has 257 entries") && message.contains("at most 256 dimensions"), "{message}");
         let (field, message) = refused(vec![dimension("a1", &[20.0]), dimension("a2", &[80.0, 70.0])]);
         assert_eq!(field, "search_space.dimensions[1].values");
-        assert!(message.contains("it must be a list of increasing values"), "{message}");
+        assert!(message.contains("it must be a valid list of values"), "{message}");
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::analysis::Analyses;
 use super::certification;
+use super::recommended_trial;
 use super::snapshot::StudySnapshot;
-use super::trial_choice;
 use crate::error::Error;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::Actor;
@@ -154,7 +154,7 @@ pub async fn certify(
     snapshot: StudySnapshot,
     analyses: Arc<Analyses>,
 ) -> Result<BestCertification, Error> {
-    let rank = move |pool: &OnPool| trial_choice::ranking_to_show(pool, &snapshot, &analyses);
+    let rank = move |pool: &OnPool| recommended_trial::ranking_to_show(pool, &snapshot, &analyses);
     let ranking = store.compute(rank).await?.map_err(Error::Learner)?;
     let mut refused = BTreeSet::new();
     loop {

@@ -106,7 +106,9 @@ fn why_not(trial: &Trial) -> Option<String> {
         let state = has_state(trial.state);
         return Some(format!("Trial {number} {state}. Walks can be simulated only with a converged gait."));
     }
-    let by_script = format!("Trial {number} was evaluated by a script, which gives no gait to walk with.");
+    let by_script = format!(
+        "Trial {number} was evaluated by a script, so its gait is not stored here and walks cannot be simulated."
+    );
     trial.script.is_some().then_some(by_script)
 }
 

@@ -25,7 +25,7 @@ pub async fn ask(
     let open = scheduler.simulating(id).open();
     if let Some(NewExecutionReport { simulated_walks, seed }) = open.filter(|open| *open != asked) {
         return Err(Error::conflict(format!(
-            "{simulated_walks} simulated walks with seed {seed} are already queued or running for this gait. Wait for them, or cancel the job execution_report-{id}."
+            "An execution report for this gait (number of simulated walks: {simulated_walks}, seed: {seed}) is already queued or running. Wait for it, or cancel the job execution_report-{id}."
         )));
     }
     let study = trials::get(writer, id).await?.study_id;

@@ -1,6 +1,6 @@
 //! The infeasibility explanation of one trial: its state, requests for it, and its storage.
 
-use super::solve_input::{PackedInput, SolveInput};
+use super::problem_file::{PackedInput, SolveInput};
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use crate::workers::SolveToExplain;
@@ -175,7 +175,9 @@ async fn explainable(db: &mut Connection, trial: &Trial) -> Result<SolveStatus, 
         )));
     };
     if !gaits::exists(db, trial.id).await? {
-        return Err(Error::conflict(format!("The last motion tried in trial {number} was not kept.")));
+        return Err(Error::conflict(format!(
+            "The last motion tried in trial {number} is no longer stored, so the trial cannot be explained."
+        )));
     }
     Ok(status)
 }

@@ -1,7 +1,7 @@
 //! The only writer of the learner's log: every answer of pages, REST, raters, lab sessions, suggestions and Gait RMSE
 //! ends here. A test fails if another module writes the table.
 
-use super::same_motion::is_same_gait;
+use super::identical_gaits::is_same_gait;
 use super::trial_transitions::has_state;
 use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
 use crate::error::Error;

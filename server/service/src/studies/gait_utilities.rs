@@ -1,7 +1,7 @@
 //! The utility of the gaits of a study, identical gaits pooled.
 
+use super::identical_gaits::pooled;
 use super::ranking::ranking;
-use super::same_motion::is_same_gait;
 use super::snapshot::StudySnapshot;
 use gait_learner::{LearnerError, Posterior, Prediction};
 use gaitwright_store::TrialId;
@@ -31,14 +31,7 @@ pub(super) fn gait_utilities(
     posterior: &Posterior,
 ) -> Result<Vec<GaitUtility>, LearnerError> {
     let ranked: Vec<&Trial> = ranking(snapshot, posterior)?.into_iter().filter_map(|id| snapshot.trial(id)).collect();
-    let mut pools: Vec<Vec<&Trial>> = Vec::new();
-    for trial in ranked {
-        let is_same = |other: &&Trial| other.action_index == trial.action_index || is_same_gait(other, trial);
-        match pools.iter_mut().find(|pool| pool.iter().any(&is_same)) {
-            Some(pool) => pool.push(trial),
-            None => pools.push(vec![trial]),
-        }
-    }
+    let pools = pooled(ranked);
     let best = pools.first().map(|pool| pool[0].action_index);
     let utility = |(place, pool): (usize, Vec<&Trial>)| {
         let action = pool[0].action_index;

@@ -19,7 +19,7 @@ pub enum StudyTransition {
     Ask,
     /// A person gave the preference.
     Answered,
-    /// A person pauses the study. Running solves finish, and no new one starts.
+    /// A person pauses the study, or it is paused after failed trials. Running solves finish, and no new one starts.
     Pause,
     /// A person resumes the study.
     Resume,

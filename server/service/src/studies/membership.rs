@@ -1,11 +1,9 @@
-//! Access to a study: adds and removes members, restricts the study to them, and invites raters. For pages and REST.
+//! Access to a study: adds and removes members, and restricts the study to them. For pages and REST.
 
-use crate::access::user_administration::{self, NewUser};
 use crate::access::{Caller, Principal, Reach, Role};
 use crate::error::Error;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::members::{self, MEMBER_ALREADY, Member, MemberKind};
-use gaitwright_store::users::User;
 use gaitwright_store::{Connection, MemberId, OnConstraint, StudyId, Writer, accessible_studies, tokens, users};
 use serde::Deserialize;
 use serde_json::json;
@@ -62,7 +60,12 @@ pub async fn add(writer: &mut Writer, actor: &Actor, study: StudyId, new: &NewMe
     insert(writer, actor, study, who).await
 }
 
-async fn insert(writer: &mut Writer, actor: &Actor, study: StudyId, who: Principal) -> Result<Member, Error> {
+pub(super) async fn insert(
+    writer: &mut Writer,
+    actor: &Actor,
+    study: StudyId,
+    who: Principal,
+) -> Result<Member, Error> {
     let id = members::insert(writer, study, who, actor.as_str())
         .await
         .on_constraint(MEMBER_ALREADY, || Error::conflict("This user or token is already a member of the study."))?;
@@ -109,32 +112,6 @@ pub(super) async fn ensure_caller_is_member(writer: &mut Writer, caller: &Caller
         insert(writer, &caller.actor, study, who).await?;
     }
     Ok(())
-}
-
-/// Assigns a rater to a study and creates a one-time sign-in link. Adds the rater if the name is new. Returns the rater
-/// and the secret of the link, which is not stored.
-///
-/// # Errors
-/// [`Error::Invalid`] if the name belongs to a user who is not a rater, [`Error::Conflict`] for a disabled rater.
-pub async fn invite(
-    writer: &mut Writer,
-    actor: &Actor,
-    study: StudyId,
-    name: &str,
-) -> Result<(User, Member, String), Error> {
-    let user = match users::by_name(writer, name).await? {
-        Some(user) if user.role == Role::Rater => user,
-        Some(_) => return Err(Error::invalid("name", name, "the name of a rater or a name that is not taken")),
-        None => user_administration::add(writer, actor, &NewUser { name: name.to_owned(), role: Role::Rater }).await?,
-    };
-    let secret = user_administration::link(writer, actor, user.id).await?;
-    let present = members::of_study(writer, study).await?;
-    let present = present.into_iter().find(|member| member.kind == MemberKind::User && member.name == user.name);
-    let member = match present {
-        Some(member) => member,
-        None => insert(writer, actor, study, Principal::User(user.id)).await?,
-    };
-    Ok((user, member, secret))
 }
 
 /// Users, with their roles, and tokens that can be added to a study, sorted by name.

@@ -1,21 +1,20 @@
 //! Decides what a study needs next (a trial, a comparison, the end), as a pure function of its snapshot.
 
 use super::analysis::Analyses;
+use super::automatic_pause::reason_to_pause;
 use super::lifecycle::StudyTransition;
 use super::pending_comparison::{self, PendingComparison};
 use super::snapshot::StudySnapshot;
 use super::trial_choice;
+use super::warm_start_choice;
 use crate::error::Error;
 use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
-use gaitwright_store::trials::{NewTrial, TrialState};
+use gaitwright_store::trials::NewTrial;
 use gaitwright_store::{FeedbackId, now};
 use std::collections::HashSet;
-
-/// After this many failed trials in a row a study is paused, because its set-up is probably wrong.
-const FAILURES_IN_A_ROW: usize = 3;
 
 /// What a study needs next.
 pub(super) enum PlanningStep {
@@ -43,11 +42,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
     if study.state != StudyState::Running {
         return Ok(PlanningStep::Nothing);
     }
-    let ended_in_a_row = snapshot.trials.iter().rev().filter(|trial| !trial.state.is_open());
-    let failed = ended_in_a_row.take(FAILURES_IN_A_ROW).filter(|trial| trial.state == TrialState::Failed).count();
-    if failed == FAILURES_IN_A_ROW {
-        let message = snapshot.trials.iter().rev().find(|t| t.state == TrialState::Failed).map(|t| t.message.clone());
-        let reason = format!("{failed} trials in a row failed. The last one: {}", message.unwrap_or_default());
+    if let Some(reason) = reason_to_pause(snapshot) {
         return Ok(PlanningStep::Transition(StudyTransition::Pause, reason));
     }
     let open = snapshot.open();
@@ -68,7 +63,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
         });
     }
     let is_full = open >= study.plan.parallel_trials as usize;
-    if is_full || study.plan.evaluation == Evaluation::Script || trial_choice::awaits_root(snapshot) {
+    if is_full || study.plan.evaluation == Evaluation::Script || warm_start_choice::awaits_root(snapshot) {
         return Ok(PlanningStep::Nothing);
     }
     let posterior = analyses.posterior(pool, snapshot).map_err(Error::Learner)?;

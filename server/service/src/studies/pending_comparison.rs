@@ -1,6 +1,6 @@
 //! Chooses the pair that a person is asked to compare next.
 
-use super::same_motion::is_same_gait;
+use super::identical_gaits::is_same_gait;
 use super::snapshot::StudySnapshot;
 use super::walkable::{NotWalkable, WalkablePair};
 use gait_learner::{ActionIndex, FeedbackLog, LearnerError, proposed_comparisons_among};

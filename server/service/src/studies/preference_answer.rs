@@ -158,7 +158,7 @@ pub async fn retract(
         return Err(Error::conflict("Only a preference can be retracted. This entry is the label of a solve."));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, ", the reason for the retraction")?;
+    let reason = printable::reason("reason", reason, " and say why the answer is retracted")?;
     if !feedback::retract(writer, &row, author, reason).await? {
         return Err(Error::conflict("This preference was already retracted."));
     }

@@ -2,8 +2,8 @@
 
 use super::analysis::Analyses;
 use super::certified_best;
+use super::recommended_trial::ranking_to_show;
 use super::snapshot::StudySnapshot;
-use super::trial_choice::ranking_to_show;
 use crate::error::Error;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};

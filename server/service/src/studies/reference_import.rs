@@ -1,6 +1,6 @@
 //! Imports reference gaits from recordings of joint angles. For pages, REST and the command line.
 
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_optimizer::ReferenceGait as Definition;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, MeasuredPerson, MotionRecording};
@@ -166,7 +166,7 @@ impl NewReferenceGait {
         if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
             let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");
             let given = format!("a file with {} bytes of comments", definition.provenance.len());
-            return Err(Error::invalid("recording", given, &allowed));
+            return Err(FieldError::described("recording", &given, &allowed).into());
         }
         Ok(definition)
     }
@@ -188,7 +188,8 @@ pub(super) fn check(definition: &Definition) -> Result<(), Error> {
     printable::name("name", &definition.name, LONGEST_NAME)?;
     if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
         let allowed = format!("at most {LONGEST_PROVENANCE_BYTES} bytes long");
-        return Err(Error::invalid("provenance", format!("{} bytes long", definition.provenance.len()), &allowed));
+        let given = format!("{} bytes long", definition.provenance.len());
+        return Err(FieldError::described("provenance", &given, &allowed).into());
     }
     Ok(definition.validate()?)
 }

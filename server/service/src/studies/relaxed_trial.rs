@@ -6,9 +6,10 @@
 use super::analysis::Analyses;
 use super::bound_grid;
 use super::lifecycle::{self, StudyTransition};
+use super::recommended_trial::best_trial;
 use super::snapshot::StudySnapshot;
-use super::study_change;
-use super::trial_choice::{best_trial, warm_start_of_next};
+use super::study_extension;
+use super::warm_start_choice::warm_start_of_next;
 use crate::error::Error;
 use gait_learner::{ActionIndex, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
@@ -224,7 +225,7 @@ pub async fn queue(writer: &mut Writer, actor: &Actor, chosen: &ChosenTrial) -> 
     let state =
         if study.state.has_ended() { lifecycle::after(study.state, StudyTransition::Extend)? } else { study.state };
     if (state, number_of_trials) != (study.state, study.plan.number_of_trials) {
-        study_change::raise_number_of_trials(writer, study, number_of_trials, state).await?;
+        study_extension::raise_number_of_trials(writer, study, number_of_trials, state).await?;
         events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": "trial.relax" })).await?;
     }
     let Some(trial) = snapshot.write_trial(writer, new).await? else { return Ok(None) };

@@ -1,6 +1,6 @@
 //! Collects the safety reports and the "cannot tell" answers of a study from all places where people give them.
 
-use super::same_motion::MotionIdentity;
+use super::identical_gaits::MotionIdentity;
 use crate::access::Reach;
 use gait_optimizer::TunedBounds;
 use gaitwright_store::blind_pairs::OrderedAnswer;

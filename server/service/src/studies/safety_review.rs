@@ -49,7 +49,7 @@ pub async fn give(
     let trial = trials::get(writer, id).await?;
     consents::may_be_shown(writer, trial.study_id).await?;
     let author = printable::name("author", decision.author.as_deref().unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", &decision.reason, ", the reason for the decision")?;
+    let reason = printable::reason("reason", &decision.reason, " and explain the decision")?;
     let reports = SafetyReports::read(writer, trial.study_id).await?;
     let in_force = reports.in_force_about(id);
     let number = trial.number;

@@ -1,6 +1,6 @@
 //! The sensitivities of one trial's gait, computed from its stored solution.
 
-use super::solve_input::PackedInput;
+use super::problem_file::PackedInput;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_learner::SearchSpace;
@@ -53,7 +53,7 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
     let number = trial.number;
     if trial.script.is_some() {
         return Err(Error::conflict(format!(
-            "Trial {number} was evaluated by a script, which gives no solution to compute sensitivities from."
+            "Trial {number} was evaluated by a script, so its solution is not stored here and sensitivities cannot be computed."
         )));
     }
     if trial.state != TrialState::Converged {

@@ -1,12 +1,11 @@
 //! A consistent snapshot of a study: its trials, its feedback log and its walkable gaits.
 
-use super::bound_grid;
 use super::walkable::{Grounds, NotWalkable, WalkableGait};
 use crate::error::Error;
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
-use gaitwright_store::studies::{AnswerSource, Evaluation, Study};
+use gaitwright_store::studies::{AnswerSource, Study};
 use gaitwright_store::trials::{Label, NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studies, trials};
 use std::collections::{HashMap, HashSet};
@@ -193,18 +192,6 @@ impl StudySnapshot {
     /// What the learner observes of an entry of the log. `None` if both trials have the same action.
     pub fn feedback_for_learner(&self, content: &FeedbackContent) -> Option<Feedback> {
         in_terms_of_actions(content, |id| self.trial(id).map(|trial| trial.action_index))
-    }
-
-    /// Actions that must not be proposed although the study has no result of them: being solved, failed, or, in a study
-    /// of a lab script, with bounds of a gait that was reported as unsafe.
-    pub fn barred_without_result(&self) -> Vec<ActionIndex> {
-        let plan = &self.study.plan;
-        let open = self.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index);
-        let unsafe_bounds =
-            self.grounds.safety_reports.reported_bounds().filter(|_| plan.evaluation == Evaluation::Script);
-        let unsafe_actions =
-            unsafe_bounds.filter_map(|bounds| bound_grid::action_of(&plan.search_space, plan.base_bounds, bounds));
-        open.chain(unsafe_actions).collect()
     }
 }
 

@@ -360,7 +360,7 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     bound_grid::validate(&plan.search_space, plan.base_bounds)?;
     check_learner(&plan.learner)?;
     if plan.learner.categories() != 2 {
-        let allowed = "one threshold, because a trial is either converged or not converged";
+        let allowed = "a list with one threshold, because a trial is either converged or not converged";
         return Err(Error::invalid("learner.ordinal_thresholds", json!(plan.learner.ordinal_thresholds), allowed));
     }
     Ok(())

@@ -109,7 +109,7 @@ pub async fn correct(
 ) -> Result<Correction, Error> {
     let before = subjects::get(writer, id).await?.body();
     let body = Body::new(new.height_m, new.body_mass_kg)?;
-    let reason = printable::reason("reason", &new.reason, ", the reason for the correction")?;
+    let reason = printable::reason("reason", &new.reason, " and say why the values are corrected")?;
     if body == before {
         return Err(Error::conflict("Height and mass already have these values."));
     }

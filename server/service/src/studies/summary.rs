@@ -1,7 +1,7 @@
 //! The summary of a study as one document, as `tune --json` prints it for scripts.
 
+use super::actions_with_known_gait::never_active;
 use super::certified_best::{BestCertification, CertificateState};
-use super::equal_actions::never_active;
 use super::snapshot::StudySnapshot;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;

@@ -2,8 +2,8 @@
 //! transaction.
 
 use super::feedback_log::{self, PROGRAM};
-use super::fold;
 use super::gait_rmse_answers::gait_rmse_answers;
+use super::local_optimum_jump;
 use super::snapshot::StudySnapshot;
 use super::trial_transitions::{self, TrialEvent};
 use crate::error::Error;
@@ -52,8 +52,9 @@ pub async fn ended(
         let study = studies::get(&mut reader, lease.study).await?;
         let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
-        if let Some(fold) =
-            snapshot.trial(lease.trial).and_then(|trial| fold::in_words(&snapshot, trial, &outcome.report))
+        if let Some(fold) = snapshot
+            .trial(lease.trial)
+            .and_then(|trial| local_optimum_jump::in_words(&snapshot, trial, &outcome.report))
         {
             end.message = fold;
         }

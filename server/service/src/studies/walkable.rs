@@ -3,8 +3,8 @@
 //! [`WalkableGait`] has private fields and one constructor, [`admit`]. Every controller file, walk, lab session,
 //! comparison and recommendation takes one, so code that skips the rules does not compile.
 
+use super::identical_gaits::is_same_gait;
 use super::reported_gaits::SafetyReports;
-use super::same_motion::is_same_gait;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
@@ -141,7 +141,10 @@ pub enum NotWalkable {
         number: u32,
     },
     /// The trajectory was pruned before it was certified.
-    #[error("The trajectory of trial {number} was deleted before its gait was certified.")]
+    #[error(
+        "The trajectory of trial {number} was deleted before its gait was certified, so the gait cannot be used for \
+         walking or compared."
+    )]
     Pruned {
         /// Number of the trial.
         number: u32,

@@ -8,8 +8,8 @@ use super::command_end::CommandEnd;
 use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
-use super::problem_flags::reference_of;
-use super::unattended::{self, Lines};
+use super::problem_files::reference_of;
+use super::unattended_study::{self, Lines};
 use clap::{Args, ValueEnum};
 use gait_optimizer::{ReferenceGait, Subject};
 use gaitwright_compute::OnPool;
@@ -19,9 +19,9 @@ use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::certified_best::BestCertification;
 use gaitwright_service::studies::history;
+use gaitwright_service::studies::recommended_trial::best_trial;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
-use gaitwright_service::studies::trial_choice::best_trial;
 use gaitwright_store::studies::{self, Study, StudyFilter, StudyState};
 use gaitwright_store::{Store, commit, gaits, reference_gaits};
 use std::path::PathBuf;
@@ -131,18 +131,19 @@ impl ReproduceCommand {
                     let (snapshot, analyses) = if finished {
                         (StudySnapshot::read(&mut *store.read().await?, study).await?, Arc::default())
                     } else {
-                        let ran = unattended::run(store, &study, 1, Lines::Progress).await?;
+                        let ran = unattended_study::run(store, &study, 1, Lines::Progress).await?;
                         if ran.interrupted {
                             return Ok(None);
                         }
                         if ran.snapshot.study.state != StudyState::Finished {
-                            let why = unattended::failure(&ran.snapshot).unwrap_or_default();
+                            let why = unattended_study::failure(&ran.snapshot).unwrap_or_default();
+                            let why = why.trim_end_matches('.');
                             return Err(Error::Internal(format!("{title}: {why}. The comparison was stopped.")));
                         }
                         (ran.snapshot, ran.analyses)
                     };
-                    failures.extend(unattended::failure(&snapshot).map(|failure| format!("{title}: {failure}")));
-                    let certification = unattended::certified(store, &snapshot, &analyses).await?;
+                    failures.extend(unattended_study::failure(&snapshot).map(|failure| format!("{title}: {failure}")));
+                    let certification = unattended_study::certified(store, &snapshot, &analyses).await?;
                     outcomes.push(
                         outcome(store, subject, muscles, seed, &snapshot, &analyses, certification, reference).await?,
                     );
@@ -183,7 +184,7 @@ impl ReproduceCommand {
             .find(|study| study.state == StudyState::Finished && study.plan.has_same_trials_as(&wanted));
         match same {
             Some(study) => Ok((study, true)),
-            None => Ok((Box::pin(unattended::study(store, new)).await?, false)),
+            None => Ok((Box::pin(unattended_study::study(store, new)).await?, false)),
         }
     }
 }
@@ -228,7 +229,7 @@ async fn outcome(
         certificate: certification.certificate,
         failures: certification.failures,
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|t| (t.number, t.gait_rmse_rad)),
-        best_bounds: best.map(|trial| unattended::action_line(&trial.action)),
+        best_bounds: best.map(|trial| unattended_study::action_line(&trial.action)),
         gait,
         reference: reference.clone(),
     })

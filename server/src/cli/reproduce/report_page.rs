@@ -6,7 +6,7 @@ use askama::Template;
 use gait_optimizer::Gait;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gaitwright_charts::gait_charts;
-use gaitwright_charts::{Chart, STYLE_SHEET, Stroke, band_in_words, gait_tiles};
+use gaitwright_charts::{Chart, STYLE_SHEET, Stroke, band_in_words, stride_pictures};
 use gaitwright_service::error::Error;
 
 #[derive(Template)]
@@ -82,7 +82,7 @@ fn pair(comparison: &PairComparison, outcomes: &[ReproducedStudy]) -> Result<Sub
     }
     let mut tiles = Vec::with_capacity(gaits.len());
     for (name, gait) in &gaits {
-        tiles.push((*name, gait_tiles(&stick_figures(gait)?)));
+        tiles.push((*name, stride_pictures(&stick_figures(gait)?)));
     }
     Ok(SubjectFigures {
         title: format!("Subject {}, seed {}", comparison.subject, comparison.seed),

@@ -30,3 +30,24 @@ pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("log", "warn,gaitwright=info", "log filter, as in RUST_LOG"),
     ("log_format", "text", "log format: text or json"),
 ];
+
+/// Environment variables that look like settings of this program but are not. They get a warning, not an error:
+/// Kubernetes announces services in variables that may start with our prefix.
+pub(in crate::cli) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
+    let is_known = |name: &str| name == "CONFIG" || KNOWN.iter().any(|(known, ..)| known.to_uppercase() == *name);
+    let mut unknown: Vec<String> =
+        names.filter(|name| name.strip_prefix("GAITWRIGHT_").is_some_and(|rest| !is_known(rest))).collect();
+    unknown.sort();
+    unknown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_environment_variables_are_found() {
+        let names = ["GAITWRIGHT_WORKER", "GAITWRIGHT_WORKERS", "GAITWRIGHT_CONFIG", "HOME"];
+        assert_eq!(unknown_variables(names.into_iter().map(str::to_owned)), ["GAITWRIGHT_WORKER"]);
+    }
+}

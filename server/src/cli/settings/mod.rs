@@ -13,6 +13,7 @@ pub(super) use without_password::without_password;
 
 use gaitwright_service::error::Error;
 use known_settings::KNOWN;
+pub(super) use known_settings::unknown_variables;
 use setting_origin::SettingOrigin;
 use settings_file::{parse, read};
 use std::collections::BTreeMap;
@@ -85,16 +86,6 @@ impl Settings {
     }
 }
 
-/// Environment variables that look like settings of this program but are not. They get a warning, not an error:
-/// Kubernetes announces services in variables that may start with our prefix.
-pub(super) fn unknown_variables(names: impl Iterator<Item = String>) -> Vec<String> {
-    let is_known = |name: &str| name == "CONFIG" || KNOWN.iter().any(|(known, ..)| known.to_uppercase() == *name);
-    let mut unknown: Vec<String> =
-        names.filter(|name| name.strip_prefix("GAITWRIGHT_").is_some_and(|rest| !is_known(rest))).collect();
-    unknown.sort();
-    unknown
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,12 +152,6 @@ mod tests {
         assert!(refused.contains("GAITWRIGHT_LOG_FORMAT") && refused.contains("text or json"), "{refused}");
         let refused = with("GAITWRIGHT_LOG", "gaitwright=loud").unwrap_err();
         assert!(refused.contains("gaitwright=loud") && refused.contains("targets and levels"), "{refused}");
-    }
-
-    #[test]
-    fn unknown_environment_variables_are_found() {
-        let names = ["GAITWRIGHT_WORKER", "GAITWRIGHT_WORKERS", "GAITWRIGHT_CONFIG", "HOME"];
-        assert_eq!(unknown_variables(names.into_iter().map(str::to_owned)), ["GAITWRIGHT_WORKER"]);
     }
 
     proptest::proptest! {

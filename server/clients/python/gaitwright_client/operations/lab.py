@@ -5,7 +5,7 @@ Made by generate.py from server/openapi.json.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Optional, cast
+from typing import Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
@@ -28,9 +28,7 @@ from ..schemas import (
     StudyId,
 )
 from ..transport import Transport
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+from ..unpack import Unpack
 
 
 class LabMethods(Transport):

@@ -6,7 +6,7 @@ Made by generate.py from server/openapi.json.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Optional, cast
+from typing import Optional, cast
 
 from ..events import Event, follow
 from ..paging import Pages
@@ -26,9 +26,7 @@ from ..schemas import (
     SubjectId,
 )
 from ..transport import Transport
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+from ..unpack import Unpack
 
 
 class StudiesMethods(Transport):

@@ -5,7 +5,7 @@ Made by generate.py from server/openapi.json.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, Optional, cast
+from typing import Literal, Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
@@ -27,9 +27,7 @@ from ..schemas import (
     TrialState,
 )
 from ..transport import Transport
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
+from ..unpack import Unpack
 
 ListTrialsSort = Literal[
     "number", "-number", "state", "-state", "gait_rmse_rad", "-gait_rmse_rad", "cost_of_transport",

@@ -87,7 +87,7 @@ impl SpaceEditor {
             LearnerError::InvalidDimension { dimension, reason } => Error::invalid(
                 &format!("values_{dimension}"),
                 self.values_of(&dimension),
-                &format!("a list of increasing values ({reason})"),
+                &format!("a valid list of values ({reason})"),
             ),
             LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
                 Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))

@@ -11,7 +11,7 @@ use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::StudyTransition;
-use gaitwright_service::studies::study_change::{self, StudyExtension};
+use gaitwright_service::studies::study_extension::{self, StudyExtension};
 use gaitwright_store::{StudyId, commit};
 use serde::Deserialize;
 
@@ -45,7 +45,7 @@ pub(in crate::pages) async fn post(
     let cancelled = if transition == StudyTransition::Extend {
         let refused = || Error::invalid("number_of_trials", form.number_of_trials.as_str(), "a whole number");
         let more = StudyExtension { number_of_trials: form.number_of_trials.trim().parse().map_err(|_| refused())? };
-        study_change::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
+        study_extension::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
         Vec::new()
     } else {
         command::transition(&mut writer, &authorized.caller.actor, id, transition, "").await?.cancelled

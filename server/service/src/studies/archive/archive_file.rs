@@ -88,7 +88,7 @@ impl<W: Write> Packer<W> {
         let mut line = serde_json::to_vec(&RowLine { table, sha256: &row.sha256(), row })?;
         line.push(b'\n');
         if line.len() > LARGEST_LINE_BYTES {
-            return Err(std::io::Error::other(format!("A row of {table} is too large for an archive.")));
+            return Err(std::io::Error::other(format!("a row of {table} is too large for an archive")));
         }
         self.hash.update(&line);
         self.rows += 1;
@@ -235,7 +235,8 @@ impl<R: Read> Unpacker<R> {
         let signed_by = match (&end.signed_by, &end.signature) {
             (None, None) => None,
             (Some(key), Some(signature)) => {
-                let key: PublicKey = key.parse().map_err(refuse)?;
+                let malformed = |_| refuse(format!("its public key {key:?} does not have 64 hexadecimal digits"));
+                let key: PublicKey = key.parse().map_err(malformed)?;
                 if !key.signed(&message(&sha256), signature) {
                     return Err(refuse(format!("its signature was not made with the key {key} that it names")));
                 }

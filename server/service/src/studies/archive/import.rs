@@ -60,7 +60,7 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
         let space = if id.is_empty() { "" } else { " " };
         let named = format!("row {number} (table {table}{space}{id:.36})");
         if let Err(error) = quarantine.add(table, row).await {
-            refused = Some(refuse(format!("{named}: {error}")));
+            refused = Some(refuse(format!("{named}: {}", error.finding())));
             break;
         }
     }
@@ -78,7 +78,7 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
         );
         return Err(refuse(how));
     }
-    quarantine.settle().await.map_err(refuse)?;
+    quarantine.settle().await.map_err(|error| refuse(error.finding()))?;
     let checked = check::study(&mut quarantine, &Pool::default()).await?;
     let origin = NewImport {
         file_sha256: whole.file_sha256,

@@ -33,7 +33,11 @@ impl SigningKey {
     /// # Errors
     /// [`Error::Malformed`] for any other text.
     pub fn read(text: &str) -> Result<Self, Error> {
-        let refuse = || Error::Malformed("This is not a key file written by `gaitwright signing-key`.".to_owned());
+        let refuse = || {
+            Error::Malformed(
+                "The file given with --sign is not a key file. Create one with `gaitwright signing-key`.".to_owned(),
+            )
+        };
         let document = text.trim().strip_prefix(PREFIX.trim_end()).ok_or_else(refuse)?;
         let document = hex::decode(document.trim()).map_err(|_| refuse())?;
         Ed25519KeyPair::from_pkcs8(&document).map(Self).map_err(|_| refuse())

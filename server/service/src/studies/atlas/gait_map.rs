@@ -1,8 +1,8 @@
 //! Which gait each action has: that of its own solve, or one that another action shares with it.
 
 use super::solved_action::SolvedAction;
+use crate::studies::actions_with_known_gait::levels_with_gait;
 use crate::studies::bound_grid;
-use crate::studies::equal_actions::levels_with_gait;
 use gait_learner::{ActionIndex, SearchSpace};
 use gait_optimizer::{ModelError, TunedBounds};
 
@@ -147,7 +147,7 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::solved_action::GaitValues;
+    use super::super::gait_values::GaitValues;
     use super::*;
     use gait_optimizer::{SolveStatus, UnchangedBound};
 

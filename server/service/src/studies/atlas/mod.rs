@@ -2,14 +2,16 @@
 //! process can continue it.
 
 mod gait_map;
+mod gait_values;
 mod progress_file;
 mod solved_action;
 
 pub use gait_map::{AtlasRow, GaitMap};
-pub use solved_action::{GaitValues, SolvedAction};
+pub use gait_values::GaitValues;
+pub use solved_action::SolvedAction;
 
 use super::bound_grid;
-use super::solve_input::SolveInput;
+use super::problem_file::SolveInput;
 use crate::error::Error;
 use gait_learner::ActionIndex;
 use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveStatus, TunedBounds, WarmStart, solve};

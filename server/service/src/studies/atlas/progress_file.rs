@@ -2,7 +2,7 @@
 
 use super::solved_action::SolvedAction;
 use crate::error::Error;
-use crate::studies::solve_input::SolveInput;
+use crate::studies::problem_file::SolveInput;
 use gait_learner::ActionIndex;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -29,7 +29,7 @@ impl ProgressFile {
     /// Opens or creates the file. Refuses that of another problem. A line that was cut off is dropped.
     pub(super) fn open(path: &Path, input: &SolveInput) -> Result<Self, Error> {
         let failed = |reason: String| Error::Malformed(format!("{}: {reason}", path.display()));
-        let io = |e: std::io::Error| failed(e.to_string());
+        let io = |e: std::io::Error| Error::Malformed(format!("Cannot open or write {}: {e}.", path.display()));
         let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(io)?;
         if file.try_lock().is_err() {
             return Err(failed("another process is using it.".to_owned()));

@@ -1,10 +1,9 @@
 //! What the atlas keeps of a solve.
 
+use super::gait_values::GaitValues;
 use crate::error::Error;
 use gait_learner::ActionIndex;
-use gait_optimizer::reference_comparison::compare_with_references;
-use gait_optimizer::spatiotemporal::Spatiotemporal;
-use gait_optimizer::{Gait, ModelError, ReferenceGait, SolveOutcome, SolveStatus, UnchangedBound};
+use gait_optimizer::{ReferenceGait, SolveOutcome, SolveStatus};
 use serde::{Deserialize, Serialize};
 
 /// The solve of one action.
@@ -20,31 +19,6 @@ pub struct SolvedAction {
     pub gait: Option<GaitValues>,
 }
 
-/// The values of a gait.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GaitValues {
-    /// Objective.
-    pub objective: f64,
-    /// Mechanical cost of transport, dimensionless.
-    pub cost_of_transport: f64,
-    /// Gait RMSE against the reference gait of the problem, rad.
-    pub gait_rmse_rad: f64,
-    /// Lowest Gait RMSE against a built-in reference gait other than that of the problem, rad.
-    pub gait_rmse_other_rad: Option<f64>,
-    /// Mean walking speed, m/s.
-    pub speed_m_s: f64,
-    /// Stride length, m.
-    pub stride_length_m: f64,
-    /// Share of the stride in double support, percent.
-    pub double_support_percent: f64,
-    /// Difference of the step times of the two legs, as a share of their mean.
-    pub step_time_asymmetry: f64,
-    /// Largest torque of either hip per body mass, N m/kg.
-    pub peak_hip_torque_nm_kg: f64,
-    /// Values of each tuned bound that leave the gait as it is.
-    pub unchanged_bounds: Vec<UnchangedBound>,
-}
-
 impl SolvedAction {
     pub(crate) fn of(action: ActionIndex, outcome: &SolveOutcome, reference: &ReferenceGait) -> Result<Self, Error> {
         let report = &outcome.report;
@@ -54,33 +28,4 @@ impl SolvedAction {
         };
         Ok(Self { action, status: report.status, iterations: report.iterations, gait })
     }
-}
-
-impl GaitValues {
-    fn of(outcome: &SolveOutcome, reference: &ReferenceGait) -> Result<Self, ModelError> {
-        let (report, gait) = (&outcome.report, &outcome.gait);
-        let compared = compare_with_references(gait, reference)?;
-        let others = compared.iter().filter(|comparison| !comparison.of_the_problem);
-        let spatiotemporal = Spatiotemporal::of(gait)?;
-        let (left, right) = (spatiotemporal.left.step_time_s, spatiotemporal.right.step_time_s);
-        Ok(Self {
-            objective: report.objective,
-            cost_of_transport: report.cost_of_transport,
-            gait_rmse_rad: report.gait_rmse_rad,
-            gait_rmse_other_rad: others.map(|comparison| comparison.gait_rmse_rad).min_by(f64::total_cmp),
-            speed_m_s: spatiotemporal.speed_m_s,
-            stride_length_m: spatiotemporal.stride_length_m,
-            double_support_percent: spatiotemporal.double_support_percent,
-            step_time_asymmetry: 2.0 * (left - right).abs() / (left + right),
-            peak_hip_torque_nm_kg: peak_hip_torque(gait) / gait.subject.body_mass_kg,
-            unchanged_bounds: report.unchanged_bounds.clone(),
-        })
-    }
-}
-
-/// Largest torque of either hip at the nodes, N m.
-fn peak_hip_torque(gait: &Gait) -> f64 {
-    const HIPS: [usize; 2] = [0, 3];
-    let torques = gait.domains.iter().flat_map(|domain| &domain.u);
-    torques.flat_map(|u| HIPS.map(|hip| u[hip].abs())).fold(0.0, f64::max)
 }

@@ -9,6 +9,7 @@ mod next_pair;
 mod rater_answers;
 mod rater_reliability;
 mod rater_unblinding;
+mod repeated_pair;
 
 pub use knowledge::{could_have_known, is_never_blind};
 pub use next_pair::{NextPair, next_pair};

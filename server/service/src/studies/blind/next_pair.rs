@@ -1,11 +1,9 @@
 //! Chooses the pair that a rater is shown next, as a pure function of the pending comparison, earlier blind pairs and
 //! a random number of the operating system. `store::allocations` draws the sides.
 
+use super::repeated_pair::repeated_pair;
 use gaitwright_store::blind_pairs::{BlindPair, BlindPairKind, OrderedAnswer};
 use gaitwright_store::{BlindPairId, TrialId};
-
-/// One in this many blind pairs repeats an earlier pair.
-const REPEAT_ONE_IN: u64 = 10;
 
 /// The chosen pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,34 +32,13 @@ pub fn next_pair(random: u64, pending: (TrialId, TrialId), before: &[BlindPair],
         }
     }
     let new = NextPair { kind: BlindPairKind::New, pair: pending, repeats: None, same_sides_as: None };
-    if !random.is_multiple_of(REPEAT_ONE_IN) {
-        return new;
-    }
     let repeat = |earlier: &BlindPair| NextPair {
         kind: BlindPairKind::Repeat,
         pair: earlier.trials(),
         repeats: Some(earlier.id),
         same_sides_as: None,
     };
-    repeatable(before, reported, random / REPEAT_ONE_IN).map_or(new, repeat)
-}
-
-/// An earlier pair with a plain answer that has not been repeated.
-fn repeatable<'a>(before: &'a [BlindPair], reported: &[TrialId], random: u64) -> Option<&'a BlindPair> {
-    let plain = |shown: &&BlindPair| {
-        shown.kind == BlindPairKind::New
-            && shown.answer.is_some_and(is_plain)
-            && !shown.has_one_of(reported)
-            && !before.iter().any(|other| other.repeats == Some(shown.id))
-    };
-    let candidates: Vec<&BlindPair> = before.iter().filter(plain).collect();
-    let index = random.checked_rem(candidates.len() as u64)?;
-    candidates.get(usize::try_from(index).ok()?).copied()
-}
-
-/// Whether an answer compares the two gaits.
-pub(super) fn is_plain(answer: OrderedAnswer) -> bool {
-    matches!(answer, OrderedAnswer::First | OrderedAnswer::Second | OrderedAnswer::NoDifference)
+    repeated_pair(random, before, reported).map_or(new, repeat)
 }
 
 /// Whether two pairs have the same gaits.

@@ -66,7 +66,7 @@ async fn pending_trials(store: &mut Store, study: StudyId) -> Result<Option<(Tri
     let found = store.compute(move |pool| pending_comparison(pool, &snapshot)).await?;
     // The learner's error may name bounds, so the rater sees only an internal error.
     let found =
-        found.map_err(|error| Error::Internal(format!("choosing the comparison of study {study_id}: {error}")))?;
+        found.map_err(|error| Error::Internal(format!("cannot choose the comparison of study {study_id}: {error}")))?;
     Ok(found.trials())
 }
 

@@ -1,6 +1,7 @@
 //! Reliability of raters: agreement with their own earlier answers, position bias, and unblinded answers.
 
-use super::next_pair::{is_plain, is_same_pair};
+use super::next_pair::is_same_pair;
+use super::repeated_pair::is_plain;
 use crate::error::Error;
 use gaitwright_store::allocations::{self, PairWithSides};
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};

@@ -75,7 +75,7 @@ pub async fn unblind(
 ) -> Result<(), Error> {
     studies::get(writer, study).await?;
     consents::may_be_shown(writer, study).await?;
-    let reason = printable::reason("reason", reason, ", the reason for unblinding")?;
+    let reason = printable::reason("reason", reason, " and say why the rater is unblinded")?;
     if !blind_pairs::of_study(writer, study).await?.iter().any(|shown| shown.rater == rater) {
         return Err(Error::invalid("rater", rater, "a rater who was shown a pair of this study"));
     }

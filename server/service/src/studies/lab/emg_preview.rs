@@ -4,7 +4,8 @@
 use super::file_format::WHAT;
 use super::upload::NewEmg;
 use crate::error::Error;
-use gait_optimizer::emg::{CHANNELS, is_plausible, strides_between};
+use gait_optimizer::emg::CHANNELS;
+use gait_optimizer::reference::{is_plausible, strides_between};
 
 /// How many intervals the trace of a channel has. Each has its smallest and its largest sample.
 const INTERVALS: usize = 400;

@@ -2,7 +2,8 @@
 
 use super::file_format::{MeasurementFormat, WHAT, check_file_name};
 use crate::error::{Error, FieldError};
-use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope, strides_between};
+use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
+use gait_optimizer::reference::strides_between;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -107,7 +108,11 @@ impl EmgReading {
         let strides = strides_between(heel_strikes_s);
         let numbered = |number: u32| usize::try_from(number).is_ok_and(|number| (1..=strides.len()).contains(&number));
         if let Some(unknown) = self.rejected_strides.iter().find(|number| !numbered(**number)) {
-            return Err(Error::invalid("reading.rejected_strides", *unknown, &format!("1 to {}", strides.len())));
+            return Err(Error::invalid(
+                "reading.rejected_strides",
+                *unknown,
+                &format!("the number of a stride, at most {}", strides.len()),
+            ));
         }
         let kept: Vec<(f64, f64)> = strides
             .into_iter()

@@ -59,7 +59,7 @@ pub async fn give(
     let session = still_shown(writer, id).await?;
     let number = next_number(&session);
     if !(1..=number).contains(&new.number) {
-        return Err(Error::invalid("number", new.number, &format!("1 to {number}")));
+        return Err(Error::invalid("number", new.number, &format!("{number}, the number of the next answer")));
     }
     if new.answer.is_about_safety() {
         return report_unsafe(writer, caller, &session, new).await;
@@ -137,7 +137,7 @@ async fn add(
     new: &NewAnswer,
 ) -> Result<LabSessionProgress, Error> {
     if !lab_answers::insert(writer, &caller.actor, id, number, (new.answer, &new.note)).await? {
-        return Err(Error::conflict("Another answer was recorded at the same time."));
+        return Err(Error::conflict("Another answer was recorded at the same time. Check it before you answer again."));
     }
     let session = lab_sessions::get(writer, id).await?;
     if session.done(SessionStep::Unblinded).is_some() {
@@ -159,7 +159,7 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, id: LabSessionId) -> 
     let answer = session.answer().ok_or_else(|| Error::conflict("There is no answer to retract."))?;
     if !can_be_retracted(&session) {
         let why = "This answer cannot be retracted here, because it is a safety report or the session is unblinded. Ask a clinician \
-                   to change it on the study page.";
+                   to retract the answer or review the safety report.";
         return Err(Error::conflict(why));
     }
     retract_number(writer, caller, id, answer.number).await?;

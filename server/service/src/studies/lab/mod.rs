@@ -5,6 +5,7 @@
 //! controller files; if a person fetches one, the record says so. Measurements and the subject's answer refer to walk
 //! numbers, and the answer reaches the learner at unblinding.
 
+mod controller_file_download;
 mod emg_preview;
 mod emg_reading;
 mod file_format;
@@ -16,8 +17,8 @@ mod session;
 mod session_view;
 mod unblinding;
 mod upload;
-mod walk_controller_file;
 
+pub use controller_file_download::{GaitOfWalk, for_device};
 pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use emg_reading::EmgReading;
@@ -38,4 +39,3 @@ pub use unblinding::unblind;
 pub use upload::{
     CheckedFile, JointAngleReading, NewEmg, NewJointAngles, UploadedFile, check_kept, read_upload, store_upload,
 };
-pub use walk_controller_file::{GaitOfWalk, for_device};

@@ -3,7 +3,7 @@
 use super::question::{AnswerView, WALKS, can_be_retracted, next_walk, requested_answer, takes_report};
 use crate::error::Error;
 use crate::printable;
-use crate::studies::same_motion::is_same_gait;
+use crate::studies::identical_gaits::is_same_gait;
 use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::{self, Actor};

@@ -1,8 +1,8 @@
 //! Unblinding of a lab session.
 
+use super::controller_file_download::not_included;
 use super::lab_answer;
 use super::session::still_shown;
-use super::walk_controller_file::not_included;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
@@ -17,7 +17,7 @@ use serde_json::json;
 /// [`Error::Invalid`] without a reason, [`Error::Conflict`] if it is already unblinded, or its allocation is not in
 /// this record.
 pub async fn unblind(writer: &mut Writer, actor: &Actor, id: LabSessionId, reason: &str) -> Result<LabSession, Error> {
-    let reason = printable::reason("reason", reason, ", the reason for unblinding")?;
+    let reason = printable::reason("reason", reason, " and say why the session is unblinded")?;
     if !still_shown(writer, id).await?.allocation.included {
         return Err(not_included());
     }

@@ -1,7 +1,7 @@
 //! The prefetch loop: while studies wait for an answer, idle workers solve the trials that may follow.
 
+use super::super::problem_file::PackedInput;
 use super::super::snapshot::StudySnapshot;
-use super::super::solve_input::PackedInput;
 use super::Scheduler;
 use super::prefetched_solves::LikelyNext;
 use super::solve_dispatch::assigned;

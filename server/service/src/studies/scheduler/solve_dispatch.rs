@@ -1,6 +1,6 @@
 //! Dispatch of solve jobs: leases a queued job and submits its solve to the engine.
 
-use super::super::solve_input::{PackedInput, SolveInput};
+use super::super::problem_file::{PackedInput, SolveInput};
 use super::super::trial_result;
 use super::Scheduler;
 use super::prefetched_solves::{PREPARED, Prepared};

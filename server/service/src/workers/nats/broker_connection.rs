@@ -142,7 +142,9 @@ impl BrokerConnection {
     /// Refuses a message that is too large, for which the broker would close the connection.
     pub(super) fn fits(&self, what: &'static str, bytes: &[u8]) -> Result<(), DispatchError> {
         // Subject and headers count too.
-        let Some(info) = self.context.client().try_server_info() else { return Err(unreachable("not connected yet")) };
+        let Some(info) = self.context.client().try_server_info() else {
+            return Err(DispatchError::Unreachable("The NATS broker is not connected yet.".to_owned()));
+        };
         let limit = info.max_payload.saturating_sub(1024);
         if bytes.len() > limit {
             return Err(DispatchError::TooLarge { what, bytes: bytes.len(), limit });

@@ -84,7 +84,7 @@ impl JetStream {
         let subject = self.link.job_subject(assignment.attempt);
         let order = SolveOrder { program: PROGRAM.to_owned(), assignment };
         let bytes = self.pool.run(move |_| pack(&order)).await.map_err(unreachable)??;
-        self.link.fits("a job", &bytes)?;
+        self.link.fits("A job", &bytes)?;
         let jobs = self.link.jobs().await?;
         match jobs.get_last_raw_message_by_subject(&subject).await {
             // Already queued, or held by a worker.

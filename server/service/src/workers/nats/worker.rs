@@ -252,7 +252,7 @@ async fn deliver(
     let HeldJob { acker, permit, .. } = job;
     let brought = ResultMessage { attempt, worker, result };
     let bytes = pool.run(move |_| {
-        let fits = |bytes: Vec<u8>| link.fits("a result", &bytes).map(|()| bytes);
+        let fits = |bytes: Vec<u8>| link.fits("A result", &bytes).map(|()| bytes);
         let bytes = pack(&brought)
             .and_then(fits)
             .or_else(|error| pack(&ResultMessage { result: AssignmentResult::Broke(error.to_string()), ..brought }));

@@ -47,7 +47,7 @@ pub(super) async fn answers(
     }
     let results = trials.values().filter(|trial| trial.state.is_result()).count();
     if labelled != results {
-        return Err(refuse(format!("{results} trials have a result, but {labelled} have a label")));
+        return Err(refuse(format!("the number of results is {results}, but the number of labels is {labelled}")));
     }
     let pairs: HashMap<_, _> = rows.iter().filter_map(|row| Some((row.id, pair(&row.content)?))).collect();
     for assessment in &assessments {
@@ -138,7 +138,9 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());
                     }
                     let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {
-                        return Err("Gait RMSE compares a trial without a Gait RMSE".to_owned());
+                        return Err(
+                            "Gait RMSE answers a comparison, but one of the two trials has no Gait RMSE".to_owned()
+                        );
                     };
                     let expected = by_gait_rmse((a.id, one), (b.id, other));
                     if pair(&expected) != pair(&row.content)

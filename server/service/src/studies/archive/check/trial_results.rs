@@ -37,7 +37,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     }
     if trial.script.is_some() || !trial.state.is_result() {
         let none = trial.report.is_none() && trial.status.is_none();
-        return if none { Ok(()) } else { Err("a trial without a solve has a solve report".to_owned()) };
+        return if none { Ok(()) } else { Err("it has a solve report or a status, but no solve".to_owned()) };
     }
     let state = trial.status.and_then(trial_transitions::label_of).map(TrialState::from);
     if state != Some(trial.state) {
@@ -76,7 +76,7 @@ pub(super) async fn gait(
     trial: &Trial,
     context: &Arc<Context>,
 ) -> Result<bool, String> {
-    let text = |error: StoreError| error.to_string();
+    let text = |error: StoreError| error.finding();
     if !gaits::exists(db, trial.id).await.map_err(text)? {
         return Ok(false);
     }
@@ -142,7 +142,7 @@ fn same_values(trial: &Trial, gait: &Gait, reference: &ReferenceGait) -> Result<
 
 /// Checks the results that workers delivered for a trial.
 pub(super) async fn check_results(db: &mut Connection, trial: &Trial) -> Result<(), String> {
-    let results = attempts::of_trial(db, trial.id).await.map_err(|e| e.to_string())?;
+    let results = attempts::of_trial(db, trial.id).await.map_err(|e| e.finding())?;
     let mut used = results.iter().filter(|result| result.used);
     let Some(result) = used.next() else { return Ok(()) };
     if used.next().is_some() {

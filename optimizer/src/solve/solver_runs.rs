@@ -1,9 +1,9 @@
-//! An attempt of a solve: a start with its result; warm starts, and solves with tightened bounds between nodes.
+//! Solver runs with their results: warm starts, and runs with tightened bounds between nodes.
 
 use super::error::SolveError;
-use super::phases::{AttemptRun, SolveContext};
+use super::phases::{RunInProgress, SolveContext};
 use super::progress::{IterationRecord, SolvePhase};
-use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra, SolveAttempt, SolveStatus};
+use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra, SolveStatus, SolverRun};
 use super::warm_start::MeshStart;
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
@@ -44,8 +44,8 @@ impl Candidate {
         }
     }
 
-    pub(super) fn attempt(&self, strategy: &str, run: &AttemptRun<'_>) -> SolveAttempt {
-        SolveAttempt {
+    pub(super) fn run(&self, strategy: &str, run: &RunInProgress<'_>) -> SolverRun {
+        SolverRun {
             strategy: strategy.to_owned(),
             status: self.status,
             iterations: run.iterations,
@@ -59,18 +59,18 @@ impl Candidate {
     }
 }
 
-/// A finished attempt.
-pub(super) struct FinishedAttempt {
+/// A finished run.
+pub(super) struct FinishedRun {
     pub(super) candidate: Candidate,
-    pub(super) attempt: SolveAttempt,
+    pub(super) run: SolverRun,
     /// Tightened bounds.
     pub(super) margins: Margins,
     pub(super) evaluation_s: f64,
     pub(super) linear_algebra: LinearAlgebra,
 }
 
-impl FinishedAttempt {
-    /// Whether no further attempt is needed: it converged or was stopped.
+impl FinishedRun {
+    /// Whether no further run is needed: it converged or was stopped.
     pub(super) fn is_final(&self) -> bool {
         matches!(self.candidate.status, SolveStatus::Converged | SolveStatus::Cancelled | SolveStatus::TimeLimit)
     }
@@ -80,11 +80,11 @@ impl FinishedAttempt {
         result: NlpResult,
         strategy: &str,
         margins: Margins,
-        run: &AttemptRun<'_>,
+        run: &RunInProgress<'_>,
     ) -> Self {
         let candidate = Candidate::new(context, result);
         Self {
-            attempt: candidate.attempt(strategy, run),
+            run: candidate.run(strategy, run),
             margins,
             evaluation_s: run.evaluation_s,
             linear_algebra: run.linear_algebra,
@@ -93,14 +93,14 @@ impl FinishedAttempt {
     }
 }
 
-/// Tries a warm start with its tightened bounds. It has the same iteration limit as other attempts, because slow
+/// Tries a warm start with its tightened bounds. It has the same iteration limit as other runs, because slow
 /// progress does not predict failure (docs/benchmarks/optimizer.md, warm starts that fail).
 pub(super) fn try_warm(
     context: &SolveContext<'_>,
     start: MeshStart,
     observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<FinishedAttempt, SolveError> {
-    let mut run = AttemptRun::new(context, context.options.threads, observer);
+) -> Result<FinishedRun, SolveError> {
+    let mut run = RunInProgress::new(context, context.options.threads, observer);
     let MeshStart { point, mut margins, strategy } = start;
     if context.options.tightening_rounds == 0 {
         margins = Margins::default();
@@ -110,14 +110,14 @@ pub(super) fn try_warm(
     } else {
         run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)
     }?;
-    Ok(FinishedAttempt::new(context, result, strategy, margins, &run))
+    Ok(FinishedRun::new(context, result, strategy, margins, &run))
 }
 
 /// Tightens the bounds that the chosen gait violates between its nodes and continues the solve, until there is no
-/// violation or the rounds are used up. Returns the index of the last converged attempt, or of a cancelled one.
+/// violation or the rounds are used up. Returns the index of the last converged run, or of a cancelled one.
 pub(super) fn enforce_between_nodes(
     context: &SolveContext<'_>,
-    tried: &mut Vec<FinishedAttempt>,
+    tried: &mut Vec<FinishedRun>,
     mut chosen: usize,
     observer: &mut dyn FnMut(&IterationRecord),
 ) -> Result<usize, SolveError> {
@@ -133,12 +133,12 @@ pub(super) fn enforce_between_nodes(
         let mut margins = now.margins.clone();
         margins.grow(&excess.margins);
         let point = now.candidate.result.warm_point();
-        let mut run = AttemptRun::new(context, context.options.threads, observer);
+        let mut run = RunInProgress::new(context, context.options.threads, observer);
         run.guess = tried.len();
         let result = run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)?;
-        let mut next = FinishedAttempt::new(context, result, "bounds tightened between nodes", margins, &run);
-        next.attempt.local_optimum =
-            tried[chosen].attempt.local_optimum.filter(|_| next.candidate.status == SolveStatus::Converged);
+        let mut next = FinishedRun::new(context, result, "bounds tightened between nodes", margins, &run);
+        next.run.local_optimum =
+            tried[chosen].run.local_optimum.filter(|_| next.candidate.status == SolveStatus::Converged);
         let status = next.candidate.status;
         tried.push(next);
         if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {

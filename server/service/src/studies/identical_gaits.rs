@@ -88,6 +88,19 @@ pub fn is_same_gait(one: &Trial, other: &Trial) -> bool {
         || MotionIdentity::of(one).zip(MotionIdentity::of(other)).is_some_and(|(one, other)| one.is_same(&other))
 }
 
+/// Trials with equal actions or identical gaits in one group each, in the order of their first trials.
+pub(super) fn pooled(trials: Vec<&Trial>) -> Vec<Vec<&Trial>> {
+    let mut pools: Vec<Vec<&Trial>> = Vec::new();
+    for trial in trials {
+        let is_same = |other: &&Trial| other.action_index == trial.action_index || is_same_gait(other, trial);
+        match pools.iter_mut().find(|pool| pool.iter().any(&is_same)) {
+            Some(pool) => pool.push(trial),
+            None => pools.push(vec![trial]),
+        }
+    }
+    pools
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

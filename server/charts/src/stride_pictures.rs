@@ -16,7 +16,7 @@ const SCALE: f64 = 88.0 / UNITS_PER_M;
 pub(super) const SIZE: (f64, f64) = (WIDTH * TILES as f64, HEIGHT);
 
 /// Figures at equal time steps as one SVG element. Each is centred on its hip, with the percentage of the cycle below.
-pub fn gait_tiles(figures: &[StickFigure]) -> String {
+pub fn stride_pictures(figures: &[StickFigure]) -> String {
     let (width, body) = (SIZE.0, body(figures));
     let name = format!("The stride in {TILES} pictures");
     format!("<svg class=\"tiles\" viewBox=\"0 0 {width} {HEIGHT}\" role=\"img\" aria-label=\"{name}\">{body}</svg>")

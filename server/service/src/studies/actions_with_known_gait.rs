@@ -11,7 +11,7 @@ use std::ops::Range;
 ///
 /// # Errors
 /// When the action of a trial is not in the search space.
-pub(super) fn equal_actions(snapshot: &StudySnapshot) -> Result<ExcludedActions, LearnerError> {
+pub(super) fn actions_with_known_gait(snapshot: &StudySnapshot) -> Result<ExcludedActions, LearnerError> {
     let space = &snapshot.study.plan.search_space;
     let mut boxes = Vec::new();
     for trial in converged(snapshot) {

@@ -1,0 +1,59 @@
+//! Clones a study: a new one with the same set-up. For pages and REST.
+
+use super::study_plan;
+use crate::error::Error;
+use gaitwright_store::audit::Actor;
+use gaitwright_store::studies::{AnswerSource, Study};
+use gaitwright_store::{StudyId, Writer, members, studies};
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+/// A new study with the set-up of another one. Absent fields are copied.
+#[derive(Debug, Clone, Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StudyClone {
+    /// Name shown to users.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Seed for all random draws except allocations.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// Number of trials.
+    #[serde(default)]
+    pub number_of_trials: Option<u32>,
+    /// Whether to solve with muscles.
+    #[serde(default)]
+    pub muscles: Option<bool>,
+    /// Who answers comparisons.
+    #[serde(default)]
+    pub answer_source: Option<AnswerSource>,
+    /// Whether to start the study immediately.
+    #[serde(default)]
+    pub start: bool,
+}
+
+/// Creates a study with the set-up of another one, without its trials.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
+pub async fn clone_study(writer: &mut Writer, actor: &Actor, id: StudyId, clone: &StudyClone) -> Result<Study, Error> {
+    let from = studies::get(writer, id).await?;
+    let mut new = study_plan::NewStudy::like(&from.plan);
+    new.name = Some(clone.name.clone().unwrap_or_else(|| clone_name(&from.plan.name)));
+    new.seed = clone.seed.unwrap_or(new.seed);
+    new.number_of_trials = clone.number_of_trials.unwrap_or(new.number_of_trials);
+    new.muscles = clone.muscles.unwrap_or(new.muscles);
+    new.answer_source = clone.answer_source.unwrap_or(new.answer_source);
+    new.start = clone.start;
+    let made = study_plan::create_from(writer, actor, new, Some(id)).await?;
+    // The set-up of a restricted study stays visible to its members only.
+    members::inherit(writer, id, made.id, actor.as_str()).await?;
+    Ok(made)
+}
+
+/// The default name of a clone: that of the study, shortened if it would be too long.
+fn clone_name(name: &str) -> String {
+    const MARK: &str = " (clone)";
+    let kept: String = name.chars().take(study_plan::LONGEST_NAME - MARK.len()).collect();
+    format!("{}{MARK}", kept.trim_end())
+}
