@@ -1,6 +1,6 @@
 """Signs in, makes one object of each kind, and prints the settings of schemathesis with their identifiers.
 
-python fuzz.py SIGN_IN_LINK
+python fuzz.py SIGN_IN_LINK DESCRIPTION
 """
 
 import json
@@ -79,8 +79,44 @@ user = call("POST", f"{v1}/users", {"name": "fuzzed", "role": "rater"})["id"]
 token = call("POST", f"{v1}/tokens", {"name": "fuzzed", "scopes": ["read"]})["id"]
 member = call("POST", f"{v1}/studies/{study}/members", {"kind": "user", "name": "fuzzed"})["id"]
 
+# Names may have every character that prints. No pattern can say which these are, so strings are of one alphabet that prints.
 print(f'headers = {{ Origin = "{address}" }}')
+print('generation.codec = "shift_jis"')
 print(f'[auth.openapi.session]\napi_key = "{cookies["gaitwright_session"]}"')
+
+with open(sys.argv[2], encoding="utf-8") as file:
+    description = json.load(file)
+
+
+def has_dependent_rule(part: Any, seen: frozenset[str] = frozenset()) -> bool:
+    """Whether a rule that depends on other values or on the record, which a schema cannot state, is in `x-depends`."""
+    if isinstance(part, list):
+        return any(has_dependent_rule(item, seen) for item in part)
+    if not isinstance(part, dict):
+        return False
+    name = str(part.get("$ref", "")).rpartition("/")[2]
+    named = description["components"]["schemas"][name] if name and name not in seen else None
+    parts = [named, *part.values()]
+    return "x-depends" in part or any(has_dependent_rule(item, seen | {name}) for item in parts)
+
+
+def matching(operation: dict[str, Any], settings: str) -> None:
+    print(f"[[operations]]\ninclude-operation-id = '{operation['operationId']}'\n{settings}")
+
+
+for path in description["paths"].values():
+    for operation in path.values():
+        parameters = operation.get("parameters", [])
+        if has_dependent_rule([parameters, operation.get("requestBody")]):
+            accepted = '["2xx", "3xx", "401", "403", "404", "409", "422", "429", "5xx"]'
+            matching(operation, f"checks.positive_data_acceptance.expected-statuses = {accepted}")
+        if any(parameter["name"] == "If-Match" for parameter in parameters):
+            matching(operation, 'parameters = { "header.If-Match" = "*" }')
+        if operation["operationId"] == "follow_study_events":
+            # OpenAPI 3.1 describes the text of a stream, which schemathesis expects in place of an event. HTTP ignores
+            # unknown headers.
+            off = ("response_schema_conformance", "negative_data_rejection")
+            matching(operation, "\n".join(f"checks.{check}.enabled = false" for check in off))
 for pattern, value in [
     (r"/subjects/\{id\}/withdraw", leaving),
     (r"/subjects/\{id\}($|/[^w])", subject),

@@ -48,8 +48,8 @@ async fn browsers_get_error_pages_and_programs_problem_documents() {
         ("/studies/abc".to_owned(), StatusCode::NOT_FOUND),
         ("/trials/abc".to_owned(), StatusCode::NOT_FOUND),
         (format!("/studies/{UNKNOWN}"), StatusCode::NOT_FOUND),
-        (format!("/studies/{study}/compare?a=zz"), StatusCode::BAD_REQUEST),
-        ("/?before=zz".to_owned(), StatusCode::BAD_REQUEST),
+        (format!("/studies/{study}/compare?a=zz"), StatusCode::UNPROCESSABLE_ENTITY),
+        ("/?before=zz".to_owned(), StatusCode::UNPROCESSABLE_ENTITY),
         (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
         ("/nothing".to_owned(), StatusCode::NOT_FOUND),
     ] {

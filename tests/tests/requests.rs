@@ -86,19 +86,6 @@ async fn event_listener_with_an_unknown_last_id_receives_new_events() {
 }
 
 #[tokio::test]
-async fn unknown_parameter_of_a_list_is_refused() {
-    let (_folder, service) = service().await;
-    let study = service.study(|new| new.start = false).await;
-    let of_study = format!("studies/{study}");
-    for path in ["studies", "subjects", "audit", &format!("{of_study}/trials"), &format!("{of_study}/preferences")] {
-        let refused = service.fetch(&format!("/api/v1/{path}?limt=5")).await;
-        assert_eq!(refused.status, StatusCode::BAD_REQUEST, "{path}");
-        assert!(refused.text.contains("limt"), "{}", refused.text);
-    }
-    service.stop().await;
-}
-
-#[tokio::test]
 async fn field_of_the_wrong_type_is_refused_with_its_value_and_the_expected_type() {
     let (_folder, service) = service().await;
     let subject = service.subject().await;
@@ -364,7 +351,7 @@ async fn searches_and_keys_are_accepted_if_and_only_if_they_match_the_descriptio
     for list in ["audit", "access-log"] {
         let search = async |text: &str| service.fetch(&format!("/api/v1/{list}?text={text}")).await.status;
         assert_eq!(search(&"x".repeat(200)).await, StatusCode::OK);
-        assert_eq!(search(&"x".repeat(201)).await, StatusCode::BAD_REQUEST);
+        assert_eq!(search(&"x".repeat(201)).await, StatusCode::UNPROCESSABLE_ENTITY);
     }
     let subject = json!({"pseudonym": "S", "height_m": 1.7, "body_mass_kg": 60.0}).to_string();
     for (key, status) in [("a b", StatusCode::CREATED), ("a\tb", StatusCode::BAD_REQUEST)] {

@@ -8,7 +8,7 @@ use axum::http::{Request, StatusCode};
 use gait_optimizer::Device;
 use gaitwright_service::access::{Caller, Right};
 use gaitwright_service::studies::lab;
-use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
+use gaitwright_service::studies::new_safety_report::{self, NewSafetyReport};
 use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::walkable::{self, NotWalkable};
 use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
@@ -257,7 +257,7 @@ async fn report_stops_a_controller_file_that_waits_for_the_access_log() {
             // Long enough for the file to be made; the response then waits for the writer.
             tokio::time::sleep(Duration::from_secs(2)).await;
             let report: NewSafetyReport = serde_json::from_value(json!({"note": "stumbled"})).unwrap();
-            safety_report::give(&mut writer, &Caller::without_sign_in(), trials[0].id, &report).await.unwrap();
+            new_safety_report::give(&mut writer, &Caller::without_sign_in(), trials[0].id, &report).await.unwrap();
             commit(writer).await.unwrap();
         };
         let (refused, ()) = tokio::join!(service.fetch(&path), report);

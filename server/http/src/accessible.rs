@@ -191,7 +191,7 @@ pub(super) async fn visible<T: Located, P: RequiredRight>(parts: &mut Parts, app
 }
 
 /// An identifier in a query or form, usable only through [`Named::accessible`].
-#[derive(Debug, Clone, Copy, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(transparent)]
 pub(crate) struct Named<T>(T);
 

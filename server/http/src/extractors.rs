@@ -42,7 +42,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Params<T> {
     type Rejection = Refusal;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Refusal> {
-        Ok(Self(query_string::read(&query_string::pairs(parts.uri.query().unwrap_or_default())?, &[])?))
+        Ok(Self(query_string::read(&query_string::pairs(parts.uri.query().unwrap_or_default())?)?))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::AppState;
 use super::accessible::StudyOfPath;
 use super::authorization::permitted;
+use super::body_limits::LONG_BODY_BYTES;
 use super::extractors::{body, unreadable};
 use crate::problem_details::Refusal;
 use axum::body::Bytes;
@@ -189,11 +190,15 @@ impl<P: RequiredRight, S: Send + Sync> FromRequest<S> for Idempotent<P> {
     }
 }
 
-impl<P: RequiredRight, T: DeserializeOwned, S: Send + Sync> FromRequest<S> for IdempotentWith<P, T> {
+impl<P: RequiredRight, T: DeserializeOwned + Send + 'static> FromRequest<AppState> for IdempotentWith<P, T> {
     type Rejection = Refusal;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
-        let (idempotent, method, headers, bytes) = read(request, state).await?;
-        Ok(Self(idempotent, body(&method, &headers, &bytes)?))
+    async fn from_request(request: Request, app: &AppState) -> Result<Self, Refusal> {
+        let (idempotent, method, headers, bytes) = read(request, app).await?;
+        if bytes.len() <= LONG_BODY_BYTES {
+            return Ok(Self(idempotent, body(&method, &headers, &bytes)?));
+        }
+        let parsed = app.clone().compute(move |_| body(&method, &headers, &bytes)).await.map_err(Error::from)?;
+        Ok(Self(idempotent, parsed?))
     }
 }

@@ -16,6 +16,7 @@ mod client_address;
 mod compression;
 pub mod connections;
 mod csv_response;
+mod described_parameters;
 mod entity_tag;
 mod extractors;
 mod figures;

@@ -6,7 +6,7 @@
 
 use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
 use super::problem_details::{PROBLEM_JSON, Problem};
-use super::{api, openapi_rules};
+use super::{api, openapi_dependent_rules, openapi_rules};
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityScheme};
@@ -22,8 +22,10 @@ use utoipa_axum::router::OpenApiRouter;
                        Ames, *Natural Multicontact Walking for Robotic Assistive Devices via Musculoskeletal Models and \
                        Hybrid Zero Dynamics*, IEEE Robotics and Automation Letters, 2022.\n\nLengths are in metres, masses \
                        in kilograms and angles in radians, unless a name or a description says otherwise. Times are in UTC \
-                       (RFC 3339). Whole numbers are written without a fraction: 10, not 10.0.\n\nLists are paginated: \
-                       `items` has the entries, and `next` is the `cursor` of the next page.\n\nWith \
+                       (RFC 3339).\n\nLists are paginated: \
+                       `items` has the entries, and `next` is the `cursor` of the next page, which has the same \
+                       filters and order. An unknown query parameter is refused (400), and so is a value that a \
+                       parameter does not accept (422).\n\nWith \
                        `download=NAME.json` in the query of a GET request, a browser saves the response under this name.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
@@ -140,8 +142,8 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     if is_page {
         parameters.push(json!({
             "name": "cursor", "in": "query", "required": false,
-            "schema": { "type": "string", "minLength": 2, "pattern": "^([0-9a-f]{2})+$" },
-            "description": "The value of `next` from the previous page; omit it for the first page"
+            "schema": { "type": "string", "minLength": 18, "pattern": "^([0-9a-f]{2})+$" },
+            "description": "The value of `next` from the previous page, with the same filters and order; omit it for the first page"
         }));
         parameters.push(json!({
             "name": "limit", "in": "query", "required": false,
@@ -149,6 +151,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
             "description": "Maximum number of entries on the page"
         }));
     }
+    parameters.iter_mut().for_each(openapi_dependent_rules::state_parameter);
     if changes && !shown_once {
         parameters.push(json!({
             "name": "Idempotency-Key", "in": "header", "required": false,
@@ -163,10 +166,10 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     };
     let may_be_absent = method == "post" && body.is_some_and(|schema| !needs_fields(schema));
     let (has_body, has_rules) = (body.is_some(), body.is_some_and(|schema| openapi_rules::has_rules(schema, schemas)));
+    let has_query = takes("query", &parameters);
     let mut problems = vec![("500", "Internal error"), ("503", "Timed out or not ready")];
-    if !parameters.is_empty() || changes {
-        problems.push(("400", "The request cannot be read"));
-    }
+    // Every operation refuses a query parameter that it does not have.
+    problems.push(("400", "The request cannot be read"));
     // A host name that the service does not answer to is refused before anything else.
     problems.push(("403", "Not allowed"));
     match operation.get("security") {
@@ -187,8 +190,8 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
         problems.push(("413", "The body is too large"));
         problems.push(("415", "Unsupported media type"));
     }
-    if is_page || has_rules {
-        problems.push(("422", "Invalid field"));
+    if has_query || has_rules {
+        problems.push(("422", "Invalid field or parameter"));
     }
     if !parameters.is_empty() {
         operation["parameters"] = Value::Array(parameters);

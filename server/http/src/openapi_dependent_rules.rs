@@ -2,7 +2,7 @@
 //! description has them in `x-depends` of the field.
 
 use super::openapi_schemas::Schemas;
-use serde_json::json;
+use serde_json::{Value, json};
 
 const GAIT: &str = "A trial of this study with a walkable gait: converged, certified, without a safety report in force. The two trials of \
                     a comparison have different gaits.";
@@ -25,7 +25,19 @@ const REFERENCE_FILE: &str = "A file in the format that `format` names, with its
                               strikes that are named in the request.";
 
 /// Component, field, and the rule.
-const RULES: [(&str, &str, &str); 27] = [
+const AUTHOR: &str = "The name of the signed-in user, unless `source` is `subject` or `script`.";
+/// Query parameter and the rule.
+const PARAMETER_RULES: [(&str, &str); 3] = [
+    ("cursor", "The value of `next` from a page of this list with the same filters and order."),
+    ("x", "A bound of the study's search space, and not that of `y`."),
+    ("y", "A bound of the study's search space, and not that of `x`."),
+];
+
+const RULES: [(&str, &str, &str); 31] = [
+    ("NewPreference", "author", AUTHOR),
+    ("NewAssessment", "author", AUTHOR),
+    ("NewSafetyReport", "author", AUTHOR),
+    ("Suggestion", "author", AUTHOR),
     ("NewPreference", "trial_a", GAIT),
     ("NewPreference", "trial_b", GAIT),
     ("NewAssessment", "trial_a", GAIT_OF_STUDY),
@@ -74,6 +86,14 @@ const RULES: [(&str, &str, &str); 27] = [
 pub(super) fn state(schemas: &mut Schemas<'_>) {
     for (component, field, rule) in RULES {
         schemas.add(component, field, &json!({ "x-depends": rule }));
+    }
+}
+
+/// Adds the rule of a query parameter to it.
+pub(super) fn state_parameter(parameter: &mut Value) {
+    let rule = PARAMETER_RULES.into_iter().find(|(name, _)| parameter["in"] == "query" && parameter["name"] == *name);
+    if let Some((_, rule)) = rule {
+        parameter["x-depends"] = rule.into();
     }
 }
 

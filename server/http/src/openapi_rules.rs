@@ -383,7 +383,9 @@ pub(super) fn has_rules(schema: &Value, schemas: &Value) -> bool {
 /// The schema of a device file; no two devices have one name.
 fn device(name: &str) -> Value {
     let mut properties = Map::new();
-    properties.insert("name".to_owned(), json!({ "type": "string", "minLength": 1, "maxLength": 80, "pattern": name }));
+    properties.insert("name".to_owned(), json!({
+        "type": "string", "minLength": 1, "maxLength": 80, "pattern": name, "x-depends": "A name that no other device has."
+    }));
     properties.insert("carried_limb".to_owned(), json!({ "type": "boolean" }));
     for field in &Device::FIELDS {
         properties.insert(

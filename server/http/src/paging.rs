@@ -2,12 +2,13 @@
 
 use super::AppState;
 use crate::problem_details::Refusal;
-use crate::query_string;
+use crate::query_string::{self, Pairs};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use gaitwright_service::error::Error;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 use utoipa::ToSchema;
 
 /// Entries on a page when the request does not say how many.
@@ -72,7 +73,11 @@ impl TryFrom<String> for SearchText {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Unfiltered {}
 
-/// The page that a request asks for: `cursor` and `limit` of its query, and the rest of it as a filter.
+/// The page that a request asks for: `cursor` and `limit` of its query, and the rest of it as a filter, which also has the
+/// order.
+///
+/// `K` is the key by which the list is sorted. It consists of values of an entry, never of its position: while a client
+/// reads the pages, entries come and go.
 #[derive(Debug)]
 pub(crate) struct Paging<K, F = Unfiltered> {
     /// Key of the last entry of the previous page; `None` for the first page.
@@ -80,6 +85,7 @@ pub(crate) struct Paging<K, F = Unfiltered> {
     /// Which entries.
     pub(crate) filter: F,
     limit: u32,
+    list: ListFingerprint,
 }
 
 impl<K: Serialize, F> Paging<K, F> {
@@ -88,12 +94,17 @@ impl<K: Serialize, F> Paging<K, F> {
         self.limit + 1
     }
 
+    /// The same, with at most `most` entries on the page: those that a request can compute.
+    pub(crate) fn at_most(self, most: u32) -> Self {
+        Self { limit: self.limit.min(most), ..self }
+    }
+
     /// Makes the page from its entries and, if there is a next page, the first entry of that page.
     pub(crate) fn page<T>(&self, mut rows: Vec<T>, key: impl Fn(&T) -> K) -> Result<Page<T>, Error> {
         let limit = self.limit as usize;
         let last = if rows.len() > limit { rows.get(limit - 1).map(key) } else { None };
         rows.truncate(limit);
-        Ok(Page { items: rows, next: last.map(|key| cursor(&key)).transpose()? })
+        Ok(Page { items: rows, next: last.map(|key| self.list.cursor(&key)).transpose()? })
     }
 
     /// The page of a short list that was read whole, in the order of its keys.
@@ -106,31 +117,44 @@ impl<K: Serialize, F> Paging<K, F> {
     }
 }
 
-impl<F> Paging<usize, F> {
-    /// [`Self::cut_by_place`], with at most `most` entries on the page: those that a request can compute.
-    pub(crate) fn cut_by_place_to<T>(mut self, rows: Vec<T>, most: u32) -> Result<Page<T>, Error> {
-        self.limit = self.limit.min(most);
-        self.cut_by_place(rows)
+/// Identifies a list: its path, filters and order. Every cursor begins with it, because its key has a meaning only there.
+#[derive(Debug, PartialEq, Eq)]
+struct ListFingerprint([u8; 8]);
+
+impl ListFingerprint {
+    fn of(path: &str, filter: &Pairs) -> Self {
+        let mut sorted: Vec<&(String, String)> = filter.iter().collect();
+        sorted.sort_unstable();
+        let hash = Sha256::digest(format!("{path} {sorted:?}"));
+        let mut first = [0; 8];
+        first.iter_mut().zip(hash).for_each(|(own, byte)| *own = byte);
+        Self(first)
     }
 
-    /// The page of a computed list, whose entries are identified by their positions.
-    pub(crate) fn cut_by_place<T>(&self, rows: Vec<T>) -> Result<Page<T>, Error> {
-        Ok(self.cut(rows.into_iter().enumerate().collect(), |(place, _)| *place)?.map(|(_, row)| row))
+    /// The text of a cursor: opaque, so that nobody builds one.
+    fn cursor<K: Serialize>(&self, key: &K) -> Result<String, Error> {
+        let key = serde_json::to_vec(key).map_err(|e| Error::Internal(e.to_string()))?;
+        Ok(hex::encode([&self.0[..], &key].concat()))
     }
-}
 
-/// The text of a cursor: opaque, so that nobody builds one.
-fn cursor<K: Serialize>(key: &K) -> Result<String, Error> {
-    let key = serde_json::to_vec(key).map_err(|e| Error::Internal(e.to_string()))?;
-    Ok(hex::encode(key))
+    /// The key in a cursor of this list.
+    fn key<K: DeserializeOwned>(&self, cursor: &str) -> Result<K, Error> {
+        let invalid = || Error::invalid("cursor", cursor, "the value of `next` from the previous page");
+        let bytes = hex::decode(cursor).map_err(|_| invalid())?;
+        let (list, key) = bytes.split_first_chunk().ok_or_else(invalid)?;
+        if *list != self.0 {
+            return Err(Error::CursorOfAnotherList(cursor.to_owned()));
+        }
+        serde_json::from_slice(key).map_err(|_| invalid())
+    }
 }
 
 impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
-    fn read(query: &str) -> Result<Self, Error> {
-        let (mut after, mut limit, mut filter) = (None, None, Vec::new());
+    fn read(path: &str, query: &str) -> Result<Self, Error> {
+        let (mut cursor, mut limit, mut filter) = (None, None, Vec::new());
         for (name, value) in query_string::pairs(query)? {
             let given = match name.as_str() {
-                "cursor" => after.replace(read_cursor(&value)?).is_some(),
+                "cursor" => cursor.replace(value).is_some(),
                 "limit" => limit.replace(read_limit(&value)?).is_some(),
                 _ => {
                     filter.push((name, value));
@@ -141,14 +165,11 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
                 return Err(Error::Malformed(query_string::occurs_twice(&name)));
             }
         }
-        let filter = query_string::read(&filter, &["cursor", "limit"])?;
-        Ok(Self { after, filter, limit: limit.unwrap_or(DEFAULT_LIMIT) })
+        let list = ListFingerprint::of(path, &filter);
+        let filter = query_string::read(&filter)?;
+        let after = cursor.map(|cursor| list.key(&cursor)).transpose()?;
+        Ok(Self { after, filter, limit: limit.unwrap_or(DEFAULT_LIMIT), list })
     }
-}
-
-fn read_cursor<K: DeserializeOwned>(text: &str) -> Result<K, Error> {
-    let key = hex::decode(text).ok().and_then(|key| serde_json::from_slice(&key).ok());
-    key.ok_or_else(|| Error::invalid("cursor", text, "the value of `next` from the previous page"))
 }
 
 fn read_limit(text: &str) -> Result<u32, Error> {
@@ -160,21 +181,27 @@ impl<K: DeserializeOwned, F: DeserializeOwned> FromRequestParts<AppState> for Pa
     type Rejection = Refusal;
 
     async fn from_request_parts(parts: &mut Parts, _: &AppState) -> Result<Self, Refusal> {
-        Ok(Self::read(parts.uri.query().unwrap_or_default())?)
+        Ok(Self::read(parts.uri.path(), parts.uri.query().unwrap_or_default())?)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{Paging, Unfiltered};
+    use gaitwright_service::error::Error;
+    use serde::Deserialize;
     use std::cmp::Reverse;
 
     type Newest = Paging<Reverse<u32>>;
 
+    fn newest(query: &str) -> Newest {
+        Newest::read("/rows", query).unwrap()
+    }
+
     fn pages(rows: &[u32], limit: usize) -> Vec<Vec<u32>> {
         let (mut pages, mut query) = (Vec::new(), format!("limit={limit}"));
         loop {
-            let page = Newest::read(&query).unwrap().cut(rows.to_vec(), |row| Reverse(*row)).unwrap();
+            let page = newest(&query).cut(rows.to_vec(), |row| Reverse(*row)).unwrap();
             pages.push(page.items);
             let Some(next) = page.next else { return pages };
             query = format!("limit={limit}&cursor={next}");
@@ -190,9 +217,34 @@ mod tests {
 
     #[test]
     fn entry_deleted_between_two_pages_hides_no_other_entry() {
-        let first = Newest::read("limit=2").unwrap().cut(vec![5, 4, 3, 2], |row| Reverse(*row)).unwrap();
-        let second = Newest::read(&format!("limit=2&cursor={}", first.next.unwrap())).unwrap();
+        let first = newest("limit=2").cut(vec![5, 4, 3, 2], |row| Reverse(*row)).unwrap();
+        let second = newest(&format!("limit=2&cursor={}", first.next.unwrap()));
         assert_eq!(second.cut(vec![5, 3, 2], |row| Reverse(*row)).unwrap().items, [3, 2]);
+    }
+
+    #[test]
+    fn cursor_is_valid_only_for_its_list_filters_and_order() {
+        #[derive(Debug, Deserialize)]
+        struct Filter {
+            #[expect(dead_code, reason = "only read")]
+            state: Option<String>,
+            #[expect(dead_code, reason = "only read")]
+            sort: Option<String>,
+        }
+        let read = |path: &str, query: &str| Paging::<u32, Filter>::read(path, query);
+        let next = read("/rows", "limit=1&state=a&sort=b").unwrap().page(vec![1, 2], |row| *row).unwrap().next.unwrap();
+        for same in ["sort=b&state=a&limit=1", "state=a&sort=b&limit=5", "state=a&sort=b"] {
+            assert_eq!(read("/rows", &format!("{same}&cursor={next}")).unwrap().after, Some(1), "{same}");
+        }
+        for (path, query) in [
+            ("/rows", "state=a"),
+            ("/rows", "state=a&sort=c"),
+            ("/rows", "state=c&sort=b"),
+            ("/others", "state=a&sort=b"),
+        ] {
+            let refused = read(path, &format!("{query}&cursor={next}"));
+            assert!(matches!(refused, Err(Error::CursorOfAnotherList(_))), "{path} {query}: {refused:?}");
+        }
     }
 
     #[test]
@@ -200,7 +252,7 @@ mod tests {
         for query in
             ["limit=0", "limit=1001", "limit=-1", "limit=x", "cursor=x", "cursor=22", "limit=1&limit=2", "other=1"]
         {
-            assert!(Paging::<u32, Unfiltered>::read(query).is_err(), "{query}");
+            assert!(Paging::<u32, Unfiltered>::read("/rows", query).is_err(), "{query}");
         }
     }
 }

@@ -80,6 +80,12 @@ impl From<&Error> for Problem {
             Error::Unreadable(field) => Self::new(ProblemKind::Malformed, detail).of(field),
             Error::UnsupportedMediaType(_) => Self::new(ProblemKind::UnsupportedMediaType, detail),
             Error::Invalid(field) => Self::new(ProblemKind::InvalidField, detail).of(field),
+            Error::CursorOfAnotherList(cursor) => Self {
+                field: Some("cursor".to_owned()),
+                value: Some(cursor.as_str().into()),
+                allowed: Some("the value of `next` from a page with the same path, filters and order".to_owned()),
+                ..Self::new(ProblemKind::CursorOfAnotherList, detail)
+            },
             Error::NotSignedIn(_) => Self::new(ProblemKind::NotSignedIn, detail),
             Error::TooManyAttempts(_) => Self::new(ProblemKind::TooManyAttempts, detail),
             Error::Changed(_) => Self::new(ProblemKind::Changed, detail),

@@ -27,6 +27,8 @@ pub(super) enum ProblemKind {
     UnsupportedMediaType,
     /// 422, a field.
     InvalidField,
+    /// 422, a cursor.
+    CursorOfAnotherList,
     /// 422, the learner.
     Learner,
     /// 429.
@@ -70,7 +72,7 @@ const fn entry(
 
 impl ProblemKind {
     /// Every kind, by status.
-    pub(super) const ALL: [Self; 18] = [
+    pub(super) const ALL: [Self; 19] = [
         Self::Malformed,
         Self::NotSignedIn,
         Self::Forbidden,
@@ -82,6 +84,7 @@ impl ProblemKind {
         Self::TooLarge,
         Self::UnsupportedMediaType,
         Self::InvalidField,
+        Self::CursorOfAnotherList,
         Self::Learner,
         Self::TooManyAttempts,
         Self::Internal,
@@ -98,7 +101,8 @@ impl ProblemKind {
                 "/problems/malformed",
                 StatusCode::BAD_REQUEST,
                 "The request cannot be read",
-                "The body is not JSON, a field has the wrong type, or a header or parameter is malformed. Nothing was changed.",
+                "The body is not JSON, a field has the wrong type, a header is malformed, or a query parameter is unknown, missing or \
+                 given twice. Nothing was changed.",
                 "Correct the part that the detail names, then send the request again.",
             ),
             Self::NotSignedIn => entry(
@@ -172,9 +176,17 @@ impl ProblemKind {
                 "/problems/invalid-field",
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "Invalid field",
-                "The value of a field is out of range or contradicts another field. Nothing was changed.",
+                "The value of a field or query parameter is not accepted or contradicts another field. Nothing was changed.",
                 "Correct the field. In the problem document, `field` is its name, `value` is the refused value, and `allowed` describes \
                  the accepted values.",
+            ),
+            Self::CursorOfAnotherList => entry(
+                "/problems/cursor-of-another-list",
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "Cursor of another list",
+                "The cursor comes from a page of another list, or of this list with other filters or in another order.",
+                "Repeat the path, the filters and the order of the first page in the request of every further page, or leave out \
+                 the cursor to begin with the first page.",
             ),
             Self::Learner => entry(
                 "/problems/learner",

@@ -22,60 +22,71 @@ pub(crate) fn occurs_twice(name: &str) -> String {
     format!("The query parameter {name} occurs twice.")
 }
 
-/// Reads the parameters. The caller has taken out the `others`, which are known too.
+/// The refusal of a parameter that is not among the known ones. No value of it is allowed.
+pub(crate) fn unknown<'a>(name: &str, value: Option<&str>, known: impl IntoIterator<Item = &'a str>) -> Error {
+    let known: Vec<&str> = known.into_iter().filter(|name| !name.is_empty()).collect();
+    let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+    Error::Unreadable(Box::new(FieldError {
+        message: format!("The query parameter {name} is unknown. Known parameters: {known}."),
+        field: name.to_owned(),
+        value: value.map(Into::into),
+        allowed: None,
+    }))
+}
+
+/// Reads the parameters.
 ///
 /// # Errors
-/// [`Error::Unreadable`] naming the parameter.
-pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs, others: &[&str]) -> Result<T, Error> {
+/// [`Error::Invalid`] naming parameter, value and what is allowed; [`Error::Unreadable`] naming a parameter that is
+/// missing, unknown or occurs twice.
+pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs) -> Result<T, Error> {
     let values = pairs.iter().map(|(name, value)| (name.as_str(), Text(value)));
     let reader = MapDeserializer::<_, Refused>::new(values);
     serde_path_to_error::deserialize(reader).map_err(|error| {
         let path = error.path().to_string();
-        unreadable(&path, &error.into_inner().to_string(), pairs, others)
+        refusal(&path, &error.into_inner().to_string(), pairs)
     })
 }
 
-fn unreadable(path: &str, message: &str, pairs: &Pairs, others: &[&str]) -> Error {
+fn refusal(path: &str, message: &str, pairs: &Pairs) -> Error {
     let named = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').next());
-    let (missing, twice) = (named("missing field `"), named("duplicate field `"));
-    let field = missing.or(twice).or(named("unknown field `")).unwrap_or(path);
-    let value = pairs.iter().find(|(name, _)| name == field).map(|(_, value)| value.as_str());
-    let unknown = message.starts_with("unknown field");
-    let of_type = ["invalid type", "invalid value", "unknown variant"].iter().any(|start| message.starts_with(start));
-    let allowed = match (missing, twice) {
-        (Some(_), _) => "present".to_owned(),
-        (_, Some(_)) => "present only once".to_owned(),
-        _ if unknown && message.ends_with("there are no fields") => String::new(),
-        _ if message.starts_with("invalid value: integer") => json_document::expected(message),
-        // The value comes before it, and may hold any words.
-        _ if unknown || of_type => {
-            json_document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]))
-        }
-        _ if message.starts_with("UUID parsing failed") => "an identifier".to_owned(),
+    let value = |field: &str| pairs.iter().find(|(name, _)| name == field).map(|(_, value)| value.as_str());
+    let unreadable = |field: &str, message: String, allowed: &str| {
+        let (field, value, allowed) = (field.to_owned(), value(field).map(Into::into), Some(allowed.to_owned()));
+        Error::Unreadable(Box::new(FieldError { message, field, value, allowed }))
+    };
+    // The value comes before what is expected, and may hold any words.
+    let expected = || json_document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]));
+    if let Some(field) = named("missing field `") {
+        return unreadable(field, format!("The query parameter {field} is missing."), "present");
+    }
+    if let Some(field) = named("duplicate field `") {
+        return unreadable(field, occurs_twice(field), "present only once");
+    }
+    if let Some(field) = named("unknown field `") {
+        let known = if message.ends_with("there are no fields") { String::new() } else { expected() };
+        let known = known.trim_start_matches("one of ").replace(" or ", ", ");
+        return unknown(field, value(field), known.split(", "));
+    }
+    let allowed = if message.starts_with("invalid value: integer") {
+        json_document::expected(message)
+    } else if ["invalid type", "invalid value", "unknown variant"].iter().any(|start| message.starts_with(start)) {
+        expected()
+    } else if message.starts_with("UUID parsing failed") {
+        "an identifier".to_owned()
+    } else {
         // The words of a reader of its own can be a whole refusal.
-        _ => {
-            message.rsplit_once("it must be ").map_or(message, |(_, allowed)| allowed).trim_end_matches('.').to_owned()
-        }
+        message.rsplit_once("it must be ").map_or(message, |(_, allowed)| allowed).trim_end_matches('.').to_owned()
     };
-    let message = match (missing, twice) {
-        (Some(_), _) => format!("The query parameter {field} is missing."),
-        (_, Some(_)) => occurs_twice(field),
-        _ if unknown => {
-            let known = allowed.trim_start_matches("one of ").replace(" or ", ", ");
-            let known: Vec<&str> = known.split(", ").chain(others.iter().copied()).filter(|k| !k.is_empty()).collect();
-            let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-            format!("The query parameter {field} is unknown. Known parameters: {known}.")
-        }
-        _ => {
-            format!("The query parameter {field} is {}; it must be {allowed}.", json_document::shortened(&value.into()))
-        }
-    };
-    Error::Unreadable(Box::new(FieldError {
-        message,
-        field: field.to_owned(),
-        value: value.map(Into::into),
-        // No value of an unknown parameter is allowed.
-        allowed: (!unknown).then_some(allowed),
+    let value = value(path).unwrap_or_default();
+    Error::Invalid(Box::new(FieldError {
+        message: format!(
+            "The query parameter {path} is {}; it must be {allowed}.",
+            json_document::shortened(&value.into())
+        ),
+        field: path.to_owned(),
+        value: Some(value.into()),
+        allowed: Some(allowed),
     }))
 }
 
@@ -174,15 +185,15 @@ mod tests {
     }
 
     fn refusal(query: &str) -> (String, String) {
-        match read::<Asked>(&pairs(query).unwrap(), &["limit"]) {
-            Err(Error::Unreadable(found)) => (found.field, found.message),
+        match read::<Asked>(&pairs(query).unwrap()) {
+            Err(Error::Unreadable(found) | Error::Invalid(found)) => (found.field, found.message),
             other => panic!("{query}: {other:?}"),
         }
     }
 
     #[test]
     fn query_values_are_parsed_to_the_types_of_their_fields() {
-        let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap(), &[]).unwrap();
+        let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap()).unwrap();
         let expected = Asked { number: 7, share: Some(0.5), order: Some(Order::Descending), contains: "12".to_owned() };
         assert_eq!(asked, expected);
     }
@@ -203,12 +214,23 @@ mod tests {
             (
                 "number=1&nmber=2",
                 "nmber",
-                "The query parameter nmber is unknown. Known parameters: number, share, order, contains, limit.",
+                "The query parameter nmber is unknown. Known parameters: number, share, order, contains.",
             ),
         ] {
             assert_eq!(refusal(query), (field.to_owned(), message.to_owned()));
         }
-        let Err(Error::Unreadable(unknown)) = read::<Asked>(&pairs("number=1&nmber=2").unwrap(), &[]) else { panic!() };
+    }
+
+    #[test]
+    fn wrong_value_is_invalid_and_wrong_set_of_parameters_is_unreadable() {
+        for query in ["number=x", "number=1&share=half", "number=1&order=up"] {
+            let Err(Error::Invalid(field)) = read::<Asked>(&pairs(query).unwrap()) else { panic!("{query}") };
+            assert!(field.value.is_some() && field.allowed.is_some(), "{query}: {field:?}");
+        }
+        for query in ["", "number=1&number=2", "number=1&nmber=2"] {
+            assert!(matches!(read::<Asked>(&pairs(query).unwrap()), Err(Error::Unreadable(_))), "{query}");
+        }
+        let Err(Error::Unreadable(unknown)) = read::<Asked>(&pairs("number=1&nmber=2").unwrap()) else { panic!() };
         assert_eq!(unknown.allowed, None, "no value of an unknown parameter is allowed");
     }
 }

@@ -1,8 +1,8 @@
 //! The router: all routes, and the layers around them.
 
 use super::{
-    AppState, access_log_layer, api, authentication, client_address, compression, host_header, metrics, openapi,
-    page_error, pages, responses, same_origin, saved_as, static_files,
+    AppState, access_log_layer, api, authentication, client_address, compression, described_parameters, host_header,
+    metrics, openapi, page_error, pages, responses, same_origin, saved_as, static_files,
 };
 use crate::problem_details::Refusal;
 use axum::Router;
@@ -28,7 +28,7 @@ pub fn router(state: AppState) -> Router {
     let routes = Router::new()
         .merge(pages::routes(&state))
         .route("/health", get(api::health::get))
-        .merge(api)
+        .merge(api.route_layer(middleware::from_fn(described_parameters::check)))
         .route("/api/openapi.json", get(description))
         .route("/metrics", get(metrics::get))
         .route("/ready", get(api::health::ready))

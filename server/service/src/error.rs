@@ -123,6 +123,11 @@ pub enum Error {
     /// A field of the request has a value that is not accepted.
     #[error("{}", .0.message)]
     Invalid(Box<FieldError>),
+    /// A cursor that came from another list, or from the same list with other filters or another order.
+    #[error(
+        "The cursor is not of this list with these filters and this order. Send the `next` of a page of the same list."
+    )]
+    CursorOfAnotherList(String),
     /// The request has no valid credential.
     #[error("{0}")]
     NotSignedIn(String),

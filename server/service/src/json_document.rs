@@ -11,6 +11,7 @@ use serde::de::{
 };
 use serde_json::Value;
 use serde_path_to_error::{Path, Segment};
+use std::borrow::Cow;
 use std::fmt;
 
 /// What a structure must be.
@@ -24,6 +25,7 @@ const SHOWN_VALUE: usize = 80;
 /// # Errors
 /// [`Error::Unreadable`] naming the field, [`Error::Malformed`] if the error has no field.
 pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
+    let bytes = &*with_whole_numbers(bytes);
     let mut reader = serde_json::Deserializer::from_slice(bytes);
     let value: T = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         // The parser reports a value of the wrong kind in place of a word as a syntax error.
@@ -35,6 +37,28 @@ pub fn read<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Error> {
     let parsed: Value = serde_json::from_slice(bytes).map_err(|e| Error::Malformed(e.to_string()))?;
     serde_path_to_error::deserialize::<_, T>(NamedFields(&parsed)).map_err(|e| unreadable(e, bytes))?;
     Ok(value)
+}
+
+/// The text with spaces in place of fractions that are zero: 10.0 is a whole number, also for JSON Schema, and some
+/// programs write every number like this. Spaces keep the positions in errors.
+fn with_whole_numbers(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let mut whole = Cow::Borrowed(bytes);
+    let (mut in_string, mut place) = (false, 0);
+    while let Some(byte) = bytes.get(place) {
+        let rest = &bytes[place..];
+        let number = rest.iter().take_while(|byte| !in_string && b"+-.0123456789Ee".contains(byte)).count();
+        let mut parts = rest[..number].splitn(2, |byte| *byte == b'.');
+        if let (Some(integer), Some(fraction)) = (parts.next(), parts.next())
+            && !integer.is_empty()
+            && !fraction.is_empty()
+            && fraction.iter().all(|byte| *byte == b'0')
+        {
+            whole.to_mut()[place + integer.len()..place + number].fill(b' ');
+        }
+        in_string ^= *byte == b'"';
+        place += if in_string && *byte == b'\\' { 2 } else { number.max(1) };
+    }
+    whole
 }
 
 fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]) -> Error {
@@ -329,6 +353,18 @@ mod tests {
         assert_eq!(read::<GaitSettings>(&written).unwrap(), settings);
         let list: Vec<Option<f64>> = read(b"[1, null, 2.5]").unwrap();
         assert_eq!(list, [Some(1.0), None, Some(2.5)]);
+    }
+
+    #[test]
+    fn fraction_of_zero_is_a_whole_number() {
+        let read = |text: &str| super::read::<Vec<u32>>(text.as_bytes());
+        assert_eq!(read("[10.0, 2.000 ,3]").unwrap(), [10, 2, 3]);
+        for refused in ["[10.5]", "[10.01]", "[1.0e1]", "[1.]", "[.0]", "[1.0.0]", "[1.0 0]", "[1.00\u{a0}]", "[1.0"] {
+            assert!(read(refused).is_err(), "{refused}");
+        }
+        let text: Vec<String> = super::read(br#"["1.0", "\"2.0\\"]"#).unwrap();
+        assert_eq!(text, ["1.0", "\"2.0\\"], "strings stay as they are");
+        assert!(super::read::<f64>(b"-0.0").unwrap().is_sign_negative());
     }
 
     #[test]

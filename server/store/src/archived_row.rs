@@ -12,7 +12,7 @@ use std::fmt;
 
 /// Largest text in a column of an archive, bytes. The program writes at most some hundred kilobytes.
 pub const LARGEST_TEXT_BYTES: usize = 4 << 20;
-/// Largest compressed value in a column of an archive, bytes. An uploaded file has at most 16 MiB.
+/// Largest compressed value in a column of an archive, bytes. An uploaded file has fewer.
 pub const LARGEST_BLOB_BYTES: usize = 16 << 20;
 /// Maximum number of columns.
 const MOST_COLUMNS: usize = 64;

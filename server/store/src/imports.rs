@@ -8,6 +8,8 @@ use sqlx::sqlite::SqliteRow;
 /// Import of a study.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Import {
+    /// Place in the order of imports.
+    pub seq: i64,
     /// SHA-256 of the archive.
     pub file_sha256: String,
     /// Public key of the signer. Absent for an unsigned archive.
@@ -76,6 +78,7 @@ pub async fn is_untrusted(db: &mut Connection, study: StudyId) -> StoreResult<bo
 
 fn from_row(row: &SqliteRow) -> StoreResult<Import> {
     Ok(Import {
+        seq: row.try_get("seq")?,
         file_sha256: row.try_get("file_sha256")?,
         signed_by: row.try_get("signed_by")?,
         trusted: row.try_get("trusted")?,

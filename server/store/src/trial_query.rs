@@ -3,7 +3,9 @@
 use super::trials::{TrialState, of_a_gait};
 use super::{Connection, StoreResult, StudyId, TrialId, json_columns};
 use gait_optimizer::TunedBounds;
-use sqlx::Row;
+use serde::{Deserialize, Serialize};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row, TypeInfo, ValueRef};
 
 /// Columns other than the bounds by which trials can be sorted.
 const COLUMNS: [&str; 6] = ["number", "state", "gait_rmse_rad", "cost_of_transport", "iterations", "seconds_total"];
@@ -31,8 +33,30 @@ pub struct Listing {
     pub contains: String,
     /// Maximum number of trials.
     pub limit: u32,
-    /// Number of trials to skip.
-    pub offset: u32,
+    /// Where the page begins.
+    pub start: Start,
+}
+
+/// Where a page of a listing begins.
+#[derive(Debug, Clone)]
+pub enum Start {
+    /// After this number of trials. While trials change state, the next page can repeat or miss some.
+    Skip(u32),
+    /// After a trial that had this place, whatever became of it since.
+    After(TrialPlace),
+}
+
+/// The place of a trial in the order of a listing: its value in the sorted column, then its number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrialPlace(SortedValue, u32);
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+enum SortedValue {
+    Absent,
+    Integer(i64),
+    Real(f64),
+    Text(String),
 }
 
 /// A row of the table.
@@ -62,6 +86,8 @@ pub struct ListedTrial {
     pub message: String,
     /// Number of trials that match the filter.
     pub matching: u32,
+    /// Its place in the order of the listing.
+    pub place: TrialPlace,
 }
 
 /// The trials of a study.
@@ -69,8 +95,12 @@ pub struct ListedTrial {
 /// # Errors
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<ListedTrial>> {
-    let rows = sqlx::query(
-        "select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
+    let (skip, after) = match &listing.start {
+        Start::Skip(skip) => (*skip, None),
+        Start::After(place) => (0, Some(place)),
+    };
+    let query = sqlx::query(
+        "with listed as (select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
          t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
          count(*) over () as matching, \
          case ?2 when 'number' then t.number when 'state' then t.state \
@@ -80,8 +110,10 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
              when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
          from trials t \
          where t.study_id = ?1 and (?4 is null or t.state = ?4) \
-             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0) \
-         order by key is null, case when ?3 then key end desc, case when ?3 then null else key end, t.number desc \
+             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0)) \
+         select * from listed where ?8 is null or (key is ?9 and number < ?8) \
+             or (?9 is not null and (key is null or case when ?3 then key < ?9 else key > ?9 end)) \
+         order by key is null, case when ?3 then key end desc, case when ?3 then null else key end, number desc \
          limit ?6 offset ?7",
     )
     .bind(study)
@@ -90,9 +122,15 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
     .bind(listing.state.map(TrialState::as_str))
     .bind(&listing.contains)
     .bind(listing.limit)
-    .bind(listing.offset)
-    .fetch_all(db)
-    .await?;
+    .bind(skip)
+    .bind(after.map(|place| place.1));
+    let query = match after.map(|place| &place.0) {
+        None | Some(SortedValue::Absent) => query.bind(None::<i64>),
+        Some(SortedValue::Integer(value)) => query.bind(*value),
+        Some(SortedValue::Real(value)) => query.bind(*value),
+        Some(SortedValue::Text(value)) => query.bind(value),
+    };
+    let rows = query.fetch_all(db).await?;
     rows.iter()
         .map(|row| {
             let from: Option<TrialId> = row.try_get("warm_started_from")?;
@@ -110,7 +148,19 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
                 seconds_total: row.try_get("seconds_total")?,
                 message: row.try_get("message")?,
                 matching: row.try_get("matching")?,
+                place: TrialPlace(sorted_value(row)?, row.try_get("number")?),
             })
         })
         .collect()
+}
+
+/// The value as the database compares it: it decides whether a number is whole.
+fn sorted_value(row: &SqliteRow) -> StoreResult<SortedValue> {
+    let kind = row.try_get_raw("key")?.type_info().name().to_owned();
+    Ok(match kind.as_str() {
+        "INTEGER" => SortedValue::Integer(row.try_get("key")?),
+        "REAL" => SortedValue::Real(row.try_get("key")?),
+        "TEXT" => SortedValue::Text(row.try_get("key")?),
+        _ => SortedValue::Absent,
+    })
 }

@@ -179,11 +179,11 @@ pub(super) async fn raters(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    paging: Paging<usize>,
+    paging: Paging<String>,
 ) -> Result<Json<Page<RaterReliability>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(blind::reliability(&mut reader, id).await?)?))
+    Ok(Json(paging.cut(blind::reliability(&mut reader, id).await?, |row| row.rater.clone())?))
 }
 
 /// Rater to unblind, with the reason.

@@ -46,7 +46,7 @@ pub(super) struct From {
     operation_id = "follow_study_events",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), ("after" = Option<u32>, Query, description = "Start after this event"), ("Last-Event-ID" = Option<i64>, Header, description = "Last event that was received")),
-    responses((status = 200, description = "Server-sent events", body = String, content_type = "text/event-stream"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Server-sent events", body = String, content_type = "text/event-stream"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(

@@ -65,7 +65,7 @@ pub(super) async fn problem(
     operation_id = "get_gait_motion_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
-    responses((status = 200, description = "OpenSim motion file in degrees, with OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "OpenSim motion file in degrees, with OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn motion_file(
@@ -93,7 +93,7 @@ pub(super) async fn motion_file(
     operation_id = "get_controller_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
-    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = document_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Controller file: curves and phase of every domain, and set points of the prosthetic joints", body = document_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn controller(

@@ -20,6 +20,7 @@ use serde::Deserialize;
 
 /// A second study or trial for comparison.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(super) struct OtherOverlaid<T> {
     other: Option<Named<T>>,
 }
@@ -63,7 +64,7 @@ pub(super) async fn of_study(
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
         ("other" = Option<TrialId>, Query, description = "Identifier of a converged trial of the same study for comparison")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_trial(
@@ -118,7 +119,7 @@ pub(super) async fn of_session(
         ("x" = Option<String>, Query, description = "Bound on the horizontal axis of a map. The most important one by default"),
         ("y" = Option<String>, Query, description = "Bound on the vertical axis of a map. The second most important one by default")
     ),
-    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_analysis(

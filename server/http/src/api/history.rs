@@ -35,9 +35,9 @@ pub(super) async fn of_study(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    paging: Paging<usize>,
+    paging: Paging<u32>,
 ) -> Result<Json<Page<Milestone>>, Refusal> {
-    Ok(Json(paging.cut_by_place(read(&mut app, id).await?)?))
+    Ok(Json(paging.cut(read(&mut app, id).await?, |milestone| milestone.iteration)?))
 }
 
 /// Download the history as CSV

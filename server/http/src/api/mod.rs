@@ -9,6 +9,7 @@ mod backups;
 mod blind;
 mod certificates;
 mod devices;
+mod emg_results;
 mod events;
 mod execution_reports;
 mod explanations;
@@ -20,6 +21,7 @@ pub mod health;
 mod history;
 mod jobs;
 mod lab_sessions;
+mod limit_cycles;
 mod measurement_files;
 mod members;
 mod preferences;
@@ -128,8 +130,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(measurement_files::content))
         .routes(routes!(measurement_files::emg))
         .routes(routes!(measurement_files::joint_angles))
-        .routes(routes!(measurement_files::result, measurement_files::process))
-        .routes(routes!(measurement_files::limit_cycles))
+        .routes(routes!(emg_results::get, emg_results::create))
+        .routes(routes!(limit_cycles::list))
         .routes(routes!(lab_sessions::session_progress))
         .routes(routes!(lab_sessions::walk))
         .routes(routes!(lab_sessions::answer))

@@ -11,7 +11,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::studies::nearest_reference;
+use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch as Nearest};
 use gaitwright_service::studies::reference_import::{self, NewReferenceGait};
 use gaitwright_store::{ReferenceGaitId, SubjectId, reference_gaits, subjects};
 use std::cmp::Reverse;
@@ -107,10 +107,10 @@ pub(super) async fn of_subject(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Id(id, _): Id<SubjectId, Read>,
-    paging: Paging<usize>,
+    paging: Paging<(u64, Reverse<ReferenceGaitId>)>,
 ) -> Result<Json<Page<ReferenceGaitMatch>>, Refusal> {
     let mut reader = app.read().await?;
     let subject = subjects::get(&mut reader, id).await?;
     let found = nearest_reference::matches(&mut reader, &subject.body()).await?;
-    Ok(Json(paging.cut_by_place(found)?.map(ReferenceGaitMatch::from)))
+    Ok(Json(paging.cut(found, Nearest::place)?.map(ReferenceGaitMatch::from)))
 }

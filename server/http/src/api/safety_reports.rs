@@ -13,8 +13,8 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
-use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
+use gaitwright_service::studies::new_safety_report::{self, NewSafetyReport};
+use gaitwright_service::studies::reported_gaits::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::{Instant, SafetyReportId, StudyId, TrialId, studies, trials};
@@ -104,7 +104,7 @@ pub(super) async fn report(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let made = safety_report::give(&mut writer, &request.caller, id, &report).await?;
+    let made = new_safety_report::give(&mut writer, &request.caller, id, &report).await?;
     let study = trials::get(&mut writer, id).await?.study_id;
     let made = SafetyReports::read(&mut writer, study)
         .await?

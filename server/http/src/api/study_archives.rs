@@ -113,9 +113,9 @@ pub(super) async fn imports_of_study(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    paging: Paging<usize>,
+    paging: Paging<i64>,
 ) -> Result<Json<Page<Import>>, Refusal> {
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    Ok(Json(paging.cut_by_place(imports::of_study(&mut reader, id).await?)?.map(Import::from)))
+    Ok(Json(paging.cut(imports::of_study(&mut reader, id).await?, |import| import.seq)?.map(Import::from)))
 }

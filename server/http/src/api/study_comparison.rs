@@ -30,7 +30,28 @@ const MOST_ON_A_PAGE: u32 = 5;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ComparisonQuery {
-    ids: String,
+    ids: DifferentStudies,
+}
+
+/// Comma-separated identifiers of several different studies.
+#[derive(Debug, Deserialize)]
+#[serde(try_from = "String")]
+struct DifferentStudies(Vec<Named<StudyId>>);
+
+impl TryFrom<String> for DifferentStudies {
+    type Error = String;
+
+    fn try_from(ids: String) -> Result<Self, String> {
+        let refused = || format!("2 to {MOST} comma-separated identifiers of different studies");
+        let ids: Result<Vec<Named<StudyId>>, _> =
+            ids.split(',').map(str::trim).filter(|id| !id.is_empty()).map(str::parse).collect();
+        let ids = ids.map_err(|_| refused())?;
+        let is_repeated = |(place, id): (usize, &Named<StudyId>)| ids[..place].contains(id);
+        if !(2..=MOST).contains(&ids.len()) || ids.iter().enumerate().any(is_repeated) {
+            return Err(refused());
+        }
+        Ok(Self(ids))
+    }
 }
 
 /// Study in a comparison.
@@ -82,38 +103,27 @@ pub(super) struct StudyComparison {
 pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    paging: Paging<usize, ComparisonQuery>,
+    paging: Paging<u32, ComparisonQuery>,
 ) -> Result<Json<Page<StudyComparison>>, Refusal> {
-    let mut compared: Vec<Study> = Vec::new();
-    for id in identifiers(&paging.filter.ids)? {
+    let paging = paging.at_most(MOST_ON_A_PAGE);
+    // The place in `ids` identifies a study: a cursor belongs to one value of `ids`.
+    let mut compared: Vec<(u32, Study)> = Vec::new();
+    for (place, id) in (0..).zip(&paging.filter.ids.0) {
         let mut reader = app.read().await?;
         let id = id.accessible(&mut reader, authorized.caller.reach()).await?;
-        if compared.iter().any(|study| study.id == id) {
-            return Err(Error::invalid("ids", paging.filter.ids.as_str(), "a list of different studies").into());
-        }
         consents::may_be_shown(&mut reader, id).await?;
-        compared.push(studies::get(&mut reader, id).await?);
+        compared.push((place, studies::get(&mut reader, id).await?));
     }
-    let one_reference =
-        compared.windows(2).all(|pair| pair[0].plan.reference_gait_id == pair[1].plan.reference_gait_id);
-    let (asked, next) = paging.cut_by_place_to(compared, MOST_ON_A_PAGE)?.into_parts();
+    let reference = |(_, study): &(u32, Study)| study.plan.reference_gait_id;
+    let one_reference = compared.windows(2).all(|pair| reference(&pair[0]) == reference(&pair[1]));
+    let (asked, next) = paging.cut(compared, |(place, _)| *place)?.into_parts();
     let mut rows = Vec::with_capacity(asked.len());
-    for study in asked {
+    for (_, study) in asked {
         let mut row = row(&mut app, study).await?;
         row.best_gait_rmse_rad = row.best_gait_rmse_rad.filter(|_| one_reference);
         rows.push(row);
     }
     Ok(Json(Page::of_parts(rows, next)))
-}
-
-/// The identifiers in the query.
-fn identifiers(ids: &str) -> Result<Vec<Named<StudyId>>, Error> {
-    let named: Vec<&str> = ids.split(',').map(str::trim).filter(|id| !id.is_empty()).collect();
-    if !(2..=MOST).contains(&named.len()) {
-        return Err(Error::invalid("ids", ids, &format!("2 to {MOST} comma-separated identifiers")));
-    }
-    let read = |id: &str| id.parse().map_err(|_| Error::invalid("ids", id, "the identifier of a study"));
-    named.into_iter().map(read).collect()
 }
 
 async fn row(app: &mut AppState, study: Study) -> Result<StudyComparison, Refusal> {

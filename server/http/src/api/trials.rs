@@ -14,39 +14,55 @@ use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gait_optimizer::TunedBounds;
+use gait_optimizer::{IterationRecord, TunedBounds};
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
-use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
 use gaitwright_service::studies::command;
-use gaitwright_store::trial_query::{self, Listing, SORTS};
+use gaitwright_store::trial_query::{self, Listing, SORTS, Start, TrialPlace};
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
-use serde::Deserialize;
+use serde::de::{Deserialize, Deserializer, Error as _};
 use std::collections::HashMap;
 
 /// Filter and order of trials.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TrialQuery {
     state: Option<TrialState>,
-    sort: Option<String>,
+    #[serde(default)]
+    sort: Sort,
 }
 
-/// Parses `sort`: a column, with a leading minus for descending order.
-fn order(sort: &str) -> Result<(&'static str, bool), Refusal> {
-    let (descending, name) = sort.strip_prefix('-').map_or((false, sort), |name| (true, name));
-    let column = SORTS.into_iter().find(|column| *column == name);
-    let column = column.ok_or_else(|| {
-        Error::invalid("sort", sort, &format!("one of {}, with a leading minus for descending order", SORTS.join(", ")))
-    })?;
-    Ok((column, descending))
+/// The column to sort by. A leading minus sorts in descending order.
+#[derive(Debug, Clone, Copy)]
+struct Sort {
+    column: &'static str,
+    descending: bool,
+}
+
+impl Default for Sort {
+    fn default() -> Self {
+        Self { column: SORTS[0], descending: false }
+    }
+}
+
+impl<'de> Deserialize<'de> for Sort {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let sort = String::deserialize(deserializer)?;
+        let (descending, name) = sort.strip_prefix('-').map_or((false, &*sort), |name| (true, name));
+        let column = SORTS.into_iter().find(|column| *column == name).ok_or_else(|| {
+            let names = SORTS.join(", ");
+            D::Error::custom(format!("one of {names}, with a leading minus for descending order"))
+        })?;
+        Ok(Self { column, descending })
+    }
 }
 
 /// List trials of a study
 ///
-/// Sorted by number, unless `sort` names another column.
+/// Sorted by number, unless `sort` names another column. A trial whose value in that column changes while a client reads
+/// the pages can be missing or occur twice; no number of a trial changes.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",
@@ -64,31 +80,24 @@ pub(super) async fn of_study(
     _: Authorized<Read>,
     State(app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
-    paging: Paging<u32, TrialQuery>,
+    paging: Paging<TrialPlace, TrialQuery>,
 ) -> Result<Json<Page<Trial>>, Refusal> {
-    let (sort, descending) = order(paging.filter.sort.as_deref().unwrap_or("number"))?;
+    let TrialQuery { state, sort } = paging.filter;
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
-    let offset = paging.after.unwrap_or(0);
     let listing = Listing {
-        sort,
-        descending,
-        state: paging.filter.state,
+        sort: sort.column,
+        descending: sort.descending,
+        state,
         contains: String::new(),
         limit: paging.to_read(),
-        offset,
+        start: paging.after.clone().map_or(Start::Skip(0), Start::After),
     };
-    let places: Vec<(u32, TrialId)> = trial_query::of_study(&mut reader, id, &listing)
-        .await?
-        .iter()
-        .map(|row| row.id)
-        .zip(offset + 1..)
-        .map(|(id, place)| (place, id))
-        .collect();
-    let (places, next) = paging.page(places, |(place, _)| *place)?.into_parts();
-    let mut found = Vec::with_capacity(places.len());
-    for (_, trial) in places {
-        found.push(trials::get(&mut reader, trial).await?.into());
+    let listed = trial_query::of_study(&mut reader, id, &listing).await?;
+    let (listed, next) = paging.page(listed, |trial| trial.place.clone())?.into_parts();
+    let mut found = Vec::with_capacity(listed.len());
+    for trial in listed {
+        found.push(trials::get(&mut reader, trial.id).await?.into());
     }
     Ok(Json(Page::of_parts(found, next)))
 }
@@ -198,7 +207,7 @@ pub(super) async fn iterations(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
-    paging: Paging<usize>,
+    paging: Paging<(usize, usize)>,
 ) -> Result<Json<Page<Iteration>>, Refusal> {
     let records = if let Some(track) = app.scheduler.running_solves().track(id) {
         track.records
@@ -206,7 +215,14 @@ pub(super) async fn iterations(
         let iterations = gaits::iterations(&mut *app.read().await?, id).await?;
         app.compute(move |pool| iterations.unpack(pool)).await??
     };
-    Ok(Json(paging.cut_by_place(records)?.map(Iteration::from)))
+    // The phases of a solve share an iteration: the last one of a phase is the start of the next.
+    let mut numbered: Vec<((usize, usize), IterationRecord)> = Vec::with_capacity(records.len());
+    for record in records {
+        let earlier = numbered.last().filter(|((iteration, _), _)| *iteration == record.iteration);
+        let repeat = earlier.map_or(0, |((_, repeat), _)| repeat + 1);
+        numbered.push(((record.iteration, repeat), record));
+    }
+    Ok(Json(paging.cut(numbered, |(key, _)| *key)?.map(|(_, record)| Iteration::from(record))))
 }
 
 /// List attempts at a trial

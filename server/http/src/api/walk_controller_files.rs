@@ -39,7 +39,7 @@ pub(super) struct WalkQuery {
         ("walk" = u8, Query, description = "Number of the walk, 2 or 3. Walk 1 is without the device"),
         ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")
     ),
-    responses((status = 200, description = "Controller file", body = document_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent"), (status = 422, description = "Invalid parameter")),
+    responses((status = 200, description = "Controller file", body = document_schemas::ControllerFile), (status = 409, description = "The gait is not walkable, or the subject withdrew consent")),
     security(("token" = ["device"]), ("session" = ["device"])),
 )]
 pub(super) async fn controller(

@@ -272,13 +272,12 @@ pub(super) async fn post(
         }
         Ok(AnswerOutcome::SameForm(saved)) => {
             let why = "This form was already sent with another answer, shown above. That answer counts; this one was not \
-                       saved. To change the answer, retract the first one and save again.";
+                       saved. To change it, choose Change in the list of answers of the study.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Ok(AnswerOutcome::AnsweredBefore(saved)) => {
             let why = "You have already answered this comparison, perhaps in another tab or window. Your first answer, shown \
-                       above, counts; this one was not saved. To change the answer, retract the first one and save \
-                       again.";
+                       above, counts; this one was not saved. To change it, choose Change in the list of answers of the study.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {

@@ -25,7 +25,7 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::relaxed_trial::NoRelaxedTrial;
-use gaitwright_service::studies::safety_reports::{ReportedGait, SafetyReports};
+use gaitwright_service::studies::reported_gaits::{ReportedGait, SafetyReports};
 use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};

@@ -12,7 +12,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Rate, Read, RequiredRight, Run, sign_in};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::{lifecycle, safety_reports};
+use gaitwright_service::studies::{lifecycle, reported_gaits};
 use gaitwright_store::studies::{Study, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
@@ -170,7 +170,7 @@ async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) 
     for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    let unsafe_gaits = safety_reports::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
+    let unsafe_gaits = reported_gaits::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
     let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
     let waiting = unsafe_gaits.chain(held).collect();
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;

@@ -9,7 +9,7 @@ use axum::extract::State;
 use axum::response::Redirect;
 use gaitwright_service::access;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::safety_report::{self, NewSafetyReport};
+use gaitwright_service::studies::new_safety_report::{self, NewSafetyReport};
 use gaitwright_service::studies::safety_review::{self, Decision};
 use gaitwright_store::safety_reviews::SafetyDecision;
 use gaitwright_store::{SafetyReportId, TrialId, commit};
@@ -61,7 +61,7 @@ pub(super) async fn report(
     Form(form): Form<NewSafetyReport>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    safety_report::give(&mut writer, &authorized.caller, id, &form).await?;
+    new_safety_report::give(&mut writer, &authorized.caller, id, &form).await?;
     commit(writer).await?;
     app.scheduler.changed();
     Ok(Redirect::to(&format!("/trials/{id}")))

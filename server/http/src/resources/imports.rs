@@ -23,7 +23,7 @@ pub(crate) struct Import {
 
 impl From<imports::Import> for Import {
     fn from(row: imports::Import) -> Self {
-        let imports::Import { file_sha256, signed_by, trusted, unchecked_rmse, actor, imported_at } = row;
+        let imports::Import { seq: _, file_sha256, signed_by, trusted, unchecked_rmse, actor, imported_at } = row;
         Self { file_sha256, signed_by, trusted, unchecked_rmse, actor, imported_at }
     }
 }

@@ -7,7 +7,7 @@ use super::analysis::Analyses;
 use super::feedback_log;
 use super::gait_rmse_answers::gait_rmse_answers;
 use super::lifecycle;
-use super::safety_reports::SafetyReports;
+use super::reported_gaits::SafetyReports;
 use super::snapshot::StudySnapshot;
 use super::trial_choice::{self, ChoiceError};
 use crate::access::Caller;

@@ -3,8 +3,9 @@
 use crate::error::Error;
 use gait_optimizer::Subject;
 use gait_optimizer::reference::distance;
-use gaitwright_store::Connection;
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
+use gaitwright_store::{Connection, ReferenceGaitId};
+use std::cmp::Reverse;
 
 /// A reference gait and the distance between the measured person and a subject.
 #[derive(Debug, Clone)]
@@ -13,6 +14,13 @@ pub struct ReferenceGaitMatch {
     pub reference_gait: ReferenceGait,
     /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
     pub distance: Option<f64>,
+}
+
+impl ReferenceGaitMatch {
+    /// Its place in the order by distance. Distances are not negative, so their bits have the order of their values.
+    pub fn place(&self) -> (u64, Reverse<ReferenceGaitId>) {
+        (self.distance.unwrap_or(f64::INFINITY).to_bits(), Reverse(self.reference_gait.id))
+    }
 }
 
 /// Every reference gait, the nearest to the subject in height and body mass first. Those without height and mass come
@@ -29,9 +37,6 @@ pub async fn matches(db: &mut Connection, subject: &Subject) -> Result<Vec<Refer
             reference_gait,
         })
         .collect();
-    found.sort_by(|a, b| {
-        let far = |m: &ReferenceGaitMatch| m.distance.unwrap_or(f64::INFINITY);
-        far(a).total_cmp(&far(b))
-    });
+    found.sort_by_key(ReferenceGaitMatch::place);
     Ok(found)
 }

@@ -1,6 +1,6 @@
 //! Records the decision of staff about a gait that was reported as unsafe, for pages and REST.
 
-use super::safety_reports::{ReportedGait, SafetyReportSource, SafetyReports};
+use super::reported_gaits::{ReportedGait, SafetyReportSource, SafetyReports};
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;

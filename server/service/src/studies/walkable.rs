@@ -4,7 +4,7 @@
 //! comparison and recommendation takes one, so code that skips the rules does not compile.
 
 use super::identical_gaits::is_same_gait;
-use super::safety_reports::SafetyReports;
+use super::reported_gaits::SafetyReports;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;

@@ -49,7 +49,8 @@ class TrialsMethods(Transport):
     ) -> Pages[Trial]:
         """List trials of a study.
 
-        Sorted by number, unless `sort` names another column.
+        Sorted by number, unless `sort` names another column. A trial whose value in that column changes while a client
+        reads the pages can be missing or occur twice; no number of a trial changes.
 
         state: Only trials in this state.
 

@@ -4,7 +4,7 @@
 use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_store::trial_query::{self, ListedTrial, Listing, SORTS};
+use gaitwright_store::trial_query::{self, ListedTrial, Listing, SORTS, Start};
 use gaitwright_store::trials::{TrialCounts, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
@@ -60,8 +60,13 @@ impl TrialsQuery {
             state,
             contains: self.text.trim().to_owned(),
             limit: PAGE,
-            offset: self.page.saturating_sub(1).saturating_mul(PAGE),
+            start: Start::Skip(self.before()),
         })
+    }
+
+    /// Number of trials on the pages before this one.
+    fn before(&self) -> u32 {
+        self.page.saturating_sub(1).saturating_mul(PAGE)
     }
 
     fn link(&self) -> Result<String, Error> {
@@ -128,14 +133,14 @@ impl TrialsTable {
         let matching = listed.first().map_or(0, |row| row.matching);
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
         let page = |page: u32| TrialsQuery { page, ..choice.clone() }.link();
-        let more = listing.offset + shown < matching;
+        let more = choice.before() + shown < matching;
         Ok(Self {
             any: counts.total > 0,
             states: states(listing.state),
             values: columns(&choice, &listing, false)?,
             bounds: columns(&choice, &listing, true)?,
             extent: (matching < counts.total || shown < matching)
-                .then(|| extent(shown, listing.offset, matching, counts.total)),
+                .then(|| extent(shown, choice.before(), matching, counts.total)),
             earlier: (choice.page > 1).then(|| page(choice.page - 1)).transpose()?,
             later: more.then(|| page(choice.page + 1)).transpose()?,
             rows: listed.into_iter().map(trial_row).collect(),

@@ -6,10 +6,10 @@ use crate::access::{Caller, secret};
 use crate::error::Error;
 use crate::printable;
 use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
+use crate::studies::new_safety_report;
 use crate::studies::pending_comparison::pending_comparison;
 use crate::studies::preference_answer as answering;
-use crate::studies::safety_report;
-use crate::studies::safety_reports::SafetyReports;
+use crate::studies::reported_gaits::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
@@ -202,7 +202,7 @@ pub async fn answer(
         let gaits = answer.unsafe_of(shown.trials());
         let is_repeated = shown.answer == Some(answer) && shown.note == given.note;
         if !(is_repeated && SafetyReports::read(writer, shown.study_id).await?.are_all_in_force(&gaits)) {
-            safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
+            new_safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
         }
         return Ok((shown.study_id, AnswerReceipt { number: shown.number }));
     }

@@ -8,7 +8,7 @@ use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
-use gaitwright_store::trial_query::{self, ListedTrial, Listing};
+use gaitwright_store::trial_query::{self, ListedTrial, Listing, Start};
 use gaitwright_store::trials::{self, Trial, TrialState};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
         state: Some(TrialState::Converged),
         contains: String::new(),
         limit,
-        offset: 0,
+        start: Start::Skip(0),
     };
     let grounds = Grounds::read(db, study).await?;
     let mut kept: Vec<(ListedTrial, Trial)> = Vec::new();

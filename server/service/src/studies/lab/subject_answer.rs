@@ -9,9 +9,9 @@ use super::unblinding;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
+use crate::studies::new_safety_report;
 use crate::studies::preference_answer as answering;
-use crate::studies::safety_report;
-use crate::studies::safety_reports::SafetyReports;
+use crate::studies::reported_gaits::SafetyReports;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};
@@ -121,7 +121,7 @@ async fn report_unsafe(
             // At most 80 characters, as every author.
             let author = format!("the subject in lab session {} ({walks}{blinded})", session.number);
             let attribution = Attribution { source: Source::Subject, author: &author, note: &new.note };
-            safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
+            new_safety_report::after_an_answer(writer, caller, &gaits, attribution).await?;
             session_progress(writer, session.id).await
         }
     }
