@@ -260,7 +260,7 @@ fn incomplete_gait_is_rejected_with_the_field() {
     }
     let mut gait = whole.clone();
     gait.domains[0].impulse = None;
-    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_R: impulse is absent, expected 4"));
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_R: impulse is absent; entries expected: 4"));
     let mut gait = whole;
     gait.domains[4].q[2][3] = f64::NAN;
     assert!(certify(&gait).unwrap_err().to_string().contains("DS2_L: a number is not finite"));

@@ -1,7 +1,7 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
 use super::measurement_forms::{FilterFields, Forms};
-use super::page_chart::PageChart;
+use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -173,10 +173,13 @@ struct MeasuredActivity {
     /// Why a comparison is uncertain, with the walk.
     warnings: Vec<String>,
     charts: Vec<PageChart>,
+    /// The legend that the charts share.
+    legend: Vec<(String, String)>,
 }
 
 impl MeasuredActivity {
-    fn of(session: &LabSessionView, emg: &EmgView, charts: Vec<PageChart>) -> Self {
+    fn of(session: &LabSessionView, emg: &EmgView, mut charts: Vec<PageChart>) -> Self {
+        let legend = shared_legend(&mut charts);
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
         let strides = |walk: &WalkActivity| {
             let strides = match walk.channels.first().map_or(0, |channel| channel.strides) {
@@ -224,6 +227,7 @@ impl MeasuredActivity {
             rows,
             model: model.collect(),
             charts,
+            legend,
         }
     }
 }
