@@ -5,13 +5,13 @@
 //! its tuned bound. Derivatives are valid while the active constraints stay the same, which [`BoundSensitivity::interval`]
 //! predicts to first order.
 
-mod active;
+mod active_set;
 mod bound_sensitivity;
 mod program_derivatives;
 mod result_derivatives;
 mod sensitivity_sentences;
 
-pub use active::ActiveConstraint;
+pub use active_set::ActiveConstraint;
 use bound_sensitivity::PointSensitivities;
 pub use bound_sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError};
 pub use result_derivatives::ResultDerivatives;

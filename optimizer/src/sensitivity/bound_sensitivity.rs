@@ -1,6 +1,6 @@
 //! The sensitivity of a gait with respect to a tuned bound: how its solution and its results follow.
 
-use super::active::{self, ActiveConstraint, ActiveSet};
+use super::active_set::{self, ActiveConstraint, ActiveSet};
 use super::program_derivatives::program_derivative;
 use super::result_derivatives::ResultDerivatives;
 use crate::gait_problem::{ConvergedGait, GaitProblem, GaitProgram, UnchangedBound, gait_of};
@@ -101,7 +101,7 @@ impl PointSensitivities {
         let (parameter, sensitivity) = (&self.parameters[bound], &self.sensitivities[bound]);
         let value = problem.bounds.to_array()[bound];
         let set = ActiveSet::new(&self.program, &solution.point);
-        let active = active::of_parameter(&self.program, &set, parameter);
+        let active = active_set::of_parameter(&self.program, &set, parameter);
         // Which of two limits is the stricter one can change beyond the point, which no derivative shows. For a bound that is
         // not active, the interval is known exactly.
         let interval = match self.unchanged_bounds.get(bound) {

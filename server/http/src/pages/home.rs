@@ -1,5 +1,6 @@
 //! The home page: pending tasks and the list of studies.
 
+use super::waiting_for_you::{WaitingStudy, waiting_studies};
 use crate::AppState;
 use crate::authorization::SignedIn;
 use crate::authorization::{Authorized, RefusedRequest};
@@ -12,7 +13,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Rate, Read, RequiredRight, Run, sign_in};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::{lifecycle, reported_gaits};
+use gaitwright_service::studies::lifecycle;
 use gaitwright_store::studies::{Study, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
@@ -138,13 +139,6 @@ fn state_in_words(state: StudyState, counts: TrialCounts) -> String {
     if is_without_gait(state, counts) { "finished, no gait".to_owned() } else { lifecycle::in_words(state).to_owned() }
 }
 
-struct WaitingStudy {
-    study: Study,
-    what: String,
-    /// The page of the action.
-    link: String,
-}
-
 /// `GET /`: the studies; for raters, their page.
 pub(super) async fn get(
     SignedIn(caller): SignedIn,
@@ -170,33 +164,11 @@ async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) 
     for study in found {
         rows.push(row(&mut reader, study).await?);
     }
-    let unsafe_gaits = reported_gaits::undecided(&mut reader, reach, PAGE).await?.into_iter().map(unsafe_gaits);
-    let held = studies::waiting_for_people(&mut reader, reach, PAGE).await?.into_iter().map(waiting);
-    let waiting = unsafe_gaits.chain(held).collect();
+    let waiting = waiting_studies(&mut reader, reach, PAGE).await?;
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     let tags = studies::tags(&mut reader, reach).await?;
     let (later, may_run) = (filter.before.is_some(), authorized.caller.may(Run::NEEDED));
     page(&Home { no_password, waiting, studies: rows, later, next, filter, tags, states: STATES, may_run })
-}
-
-/// Safety reports that staff have to review.
-fn unsafe_gaits((study, count): (Study, usize)) -> WaitingStudy {
-    let what = match count {
-        1 => "1 gait reported as unsafe needs a safety review".to_owned(),
-        _ => format!("{count} gaits reported as unsafe need a safety review"),
-    };
-    WaitingStudy { link: format!("/studies/{}", study.id), what, study }
-}
-
-fn waiting(study: Study) -> WaitingStudy {
-    let (what, place) = match study.state {
-        StudyState::Waiting => ("a comparison needs your answer".to_owned(), "/compare"),
-        // A pause by a user has no reason; a pause by the service has one.
-        StudyState::Paused if study.state_reason.is_empty() => ("paused: resume it to continue".to_owned(), ""),
-        StudyState::Paused => (format!("paused: {}", study.state_reason), ""),
-        _ => (lifecycle::in_words(study.state).to_owned(), ""),
-    };
-    WaitingStudy { link: format!("/studies/{}{place}", study.id), what, study }
 }
 
 async fn row(db: &mut Connection, study: Study) -> Result<HomeRow, Error> {

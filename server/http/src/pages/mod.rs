@@ -48,6 +48,7 @@ mod undo;
 mod unit_choice;
 mod unsent_form;
 mod users;
+mod waiting_for_you;
 mod walking_pair;
 
 use super::AppState;

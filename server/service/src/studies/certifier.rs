@@ -1,10 +1,10 @@
 //! The job that certifies a gait: requested ones, then the best ones of ended studies until one passes.
 
 use super::analysis::Analyses;
+use super::job_queue::RequestOrder;
 use super::recommended_trial::ranking_to_show;
 use super::snapshot::StudySnapshot;
 use super::trial_jobs::TrialJob;
-use super::trial_queue::RequestOrder;
 use super::{certification, certified_best};
 use crate::error::Error;
 use crate::workers::Certify;

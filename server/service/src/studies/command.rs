@@ -1,6 +1,7 @@
 //! Commands for studies (start, pause, resume, stop) and trials (cancel, retry), each in one transaction.
 
 use super::lifecycle::{self, StudyTransition};
+use super::requeued_trial;
 use super::snapshot::has_changed;
 use super::trial_result;
 use crate::error::Error;
@@ -88,6 +89,6 @@ pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &st
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] if the trial is open or has a result.
 pub async fn retry(writer: &mut Writer, actor: &Actor, id: TrialId) -> Result<(), Error> {
-    trial_result::retried(writer, id).await?;
+    requeued_trial::retried(writer, id).await?;
     Ok(audit::append(writer, actor, "trial.retry", &format!("trial {id}"), &json!({})).await?)
 }

@@ -2,8 +2,8 @@
 //! certified.
 
 use super::explanation::{self, Elapsed, ExplanationEffort};
+use super::job_queue::TrialJobState;
 use super::trial_jobs::{TrialJob, run_cancellable};
-use super::trial_queue::TrialJobState;
 use crate::error::Error;
 use crate::workers::Explain;
 use gait_optimizer::CancelToken;

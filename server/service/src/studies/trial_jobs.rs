@@ -3,7 +3,7 @@
 //! Requested trials come first, then those of ended studies. Requests and cancellations are on record, so the jobs
 //! continue after a crash.
 
-use super::trial_queue::{RequestOrder, RunningJob, TrialJobState, TrialQueue};
+use super::job_queue::{JobQueue, RequestOrder, RunningJob, TrialJobState};
 use crate::error::Error;
 use crate::job::JobState;
 use gait_optimizer::CancelToken;
@@ -70,7 +70,7 @@ pub(super) trait TrialJob: Send + Sync {
 pub(super) struct TrialJobs<J: TrialJob> {
     store: Store,
     job: J,
-    queue: Mutex<TrialQueue<J::Request>>,
+    queue: Mutex<JobQueue<J::Request>>,
     wake: Notify,
 }
 
@@ -244,7 +244,7 @@ impl<J: TrialJob> TrialJobs<J> {
         }
     }
 
-    fn queue(&self) -> MutexGuard<'_, TrialQueue<J::Request>> {
+    fn queue(&self) -> MutexGuard<'_, JobQueue<J::Request>> {
         // The queue is consistent between statements, so a poisoned lock is usable.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }

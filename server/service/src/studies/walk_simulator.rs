@@ -1,8 +1,8 @@
 //! The job that simulates walks with the gait of a trial, on request.
 
 use super::execution::{self, NewExecutionReport, Simulation};
+use super::job_queue::TrialJobState;
 use super::trial_jobs::{TrialJob, run_cancellable};
-use super::trial_queue::TrialJobState;
 use crate::error::Error;
 use gait_optimizer::execution::simulate;
 use gaitwright_store::{Store, StoreResult, TrialId, cancelled_jobs, execution_reports};

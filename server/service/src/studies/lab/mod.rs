@@ -12,6 +12,7 @@ mod file_format;
 mod joint_angle_preview;
 mod measurement_results;
 mod question;
+mod rejected_strides;
 mod session;
 mod session_view;
 mod subject_answer;

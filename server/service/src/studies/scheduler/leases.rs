@@ -1,6 +1,6 @@
 //! Leases of jobs: renewed while a worker reports, taken back when a worker is silent or a process was killed.
 
-use super::super::trial_result;
+use super::super::requeued_trial;
 use super::Scheduler;
 use crate::error::Error;
 use crate::workers::{Attempt, IN_PROCESS};
@@ -54,7 +54,7 @@ impl Scheduler {
     /// Takes a job back from the engine, without counting a failure.
     pub(super) async fn give_back(&self, lease: &Lease) -> Result<(), Error> {
         self.cancel_solve(lease.trial).await;
-        trial_result::interrupted(&self.0.store, lease).await.map(drop)
+        requeued_trial::interrupted(&self.0.store, lease).await.map(drop)
     }
 
     /// Handles an expired lease. A job that no worker has started is dispatched again, in case the engine lost it. A
@@ -62,7 +62,7 @@ impl Scheduler {
     pub(super) async fn handle_expired(&self, lease: &Lease) -> Result<(), Error> {
         if !self.replace_unstarted(lease).await? {
             self.cancel_solve(lease.trial).await;
-            trial_result::record_expired_lease(&self.0.store, lease).await?;
+            requeued_trial::record_expired_lease(&self.0.store, lease).await?;
         }
         Ok(())
     }

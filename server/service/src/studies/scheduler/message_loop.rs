@@ -1,5 +1,6 @@
 //! The message loop: receives what workers report, and records starts, heartbeats and results.
 
+use super::super::requeued_trial;
 use super::super::trial_result;
 use super::{HEARTBEATS_PER_LEASE, Scheduler};
 use crate::error::Error;
@@ -92,7 +93,7 @@ impl Scheduler {
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(()) };
         let (outcome, iterations) = match result {
             AssignmentResult::Ended { outcome, iterations } => (outcome, iterations),
-            AssignmentResult::Broke(reason) => return trial_result::broke(&store, &lease, &reason).await.map(drop),
+            AssignmentResult::Broke(reason) => return requeued_trial::broke(&store, &lease, &reason).await.map(drop),
         };
         let pack = move |pool: &OnPool| {
             let packed = gaits::PackedGait::new(pool, &outcome, &iterations);
@@ -102,7 +103,7 @@ impl Scheduler {
         let packed = packed?;
         if packed.is_none() && outcome.report.status == SolveStatus::Converged {
             let reason = "The solver returned a converged gait with numbers that are not finite.";
-            return trial_result::broke(&store, &lease, reason).await.map(drop);
+            return requeued_trial::broke(&store, &lease, reason).await.map(drop);
         }
         trial_result::ended(&mut store, &lease, worker, &outcome, packed.as_ref()).await.map(drop)
     }

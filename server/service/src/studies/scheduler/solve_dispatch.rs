@@ -1,7 +1,7 @@
 //! Dispatch of solve jobs: leases a queued job and submits its solve to the engine.
 
 use super::super::problem_file::{PackedInput, SolveInput};
-use super::super::trial_result;
+use super::super::requeued_trial;
 use super::Scheduler;
 use super::prefetched_solves::{PREPARED, Prepared};
 use crate::dispatch_error::DispatchError;
@@ -40,7 +40,7 @@ impl Scheduler {
         let assignment = match assignment(&mut self.0.unpacking.clone(), lease).await {
             Ok(assignment) => assignment,
             Err(error) => {
-                trial_result::broke(&self.0.store, lease, &error.to_string()).await?;
+                requeued_trial::broke(&self.0.store, lease, &error.to_string()).await?;
                 return Ok(());
             }
         };

@@ -39,7 +39,7 @@ pub(super) enum TrialJobState<R> {
 }
 
 /// The queue. One job runs at a time.
-pub(super) struct TrialQueue<R> {
+pub(super) struct JobQueue<R> {
     /// Requests in order, without the running one.
     requested: Vec<(TrialId, R)>,
     running: Option<RunningJob<R>>,
@@ -62,7 +62,7 @@ pub(super) struct RunningJob<R> {
     pub(super) cancelled: CancellationToken,
 }
 
-impl<R> Default for TrialQueue<R> {
+impl<R> Default for JobQueue<R> {
     fn default() -> Self {
         Self {
             requested: Vec::new(),
@@ -75,7 +75,7 @@ impl<R> Default for TrialQueue<R> {
     }
 }
 
-impl<R: Clone> TrialQueue<R> {
+impl<R: Clone> JobQueue<R> {
     /// Queues the job of a trial, unless it is queued, is running or has failed.
     pub(super) fn ask(&mut self, trial: TrialId, request: R) {
         self.cancelled.remove(&trial);
@@ -231,7 +231,7 @@ mod tests {
         trials
     }
 
-    fn begun(queue: &mut TrialQueue<u32>, order: RequestOrder) -> Option<(TrialId, u32)> {
+    fn begun(queue: &mut JobQueue<u32>, order: RequestOrder) -> Option<(TrialId, u32)> {
         let running = queue.begin_requested(order, Instant::now());
         queue.end();
         running.map(|running| (running.trial, running.request))
@@ -243,7 +243,7 @@ mod tests {
         for (order, expected) in
             [(RequestOrder::OldestRequest, [middle, new, old]), (RequestOrder::NewestTrial, [new, middle, old])]
         {
-            let mut queue = TrialQueue::default();
+            let mut queue = JobQueue::default();
             for (trial, request) in [(middle, 1), (new, 2), (old, 3), (new, 4)] {
                 queue.ask(trial, request);
             }
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn cancelled_job_stops_and_can_be_requested_again() {
         let [trial, other, _] = trials();
-        let mut queue = TrialQueue::default();
+        let mut queue = JobQueue::default();
         queue.ask(trial, 1);
         let running = queue.begin_requested(RequestOrder::OldestRequest, Instant::now()).unwrap();
         assert_eq!(queue.open(), [(trial, JobState::Running)]);
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn failed_job_is_not_repeated_until_it_is_forgotten() {
         let [trial, ..] = trials();
-        let mut queue = TrialQueue::default();
+        let mut queue = JobQueue::default();
         queue.ask(trial, 1);
         queue.begin_requested(RequestOrder::OldestRequest, Instant::now()).unwrap();
         queue.fail(trial, "no gait".to_owned());
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn postponed_job_lets_others_pass_until_its_time() {
         let [trial, other, _] = trials();
-        let mut queue = TrialQueue::default();
+        let mut queue = JobQueue::default();
         queue.ask(trial, 1);
         queue.ask(other, 2);
         queue.begin_requested(RequestOrder::OldestRequest, Instant::now()).unwrap();
