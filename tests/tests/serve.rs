@@ -146,7 +146,7 @@ fn failing_scheduled_backups_are_shown() {
     let process = [3, 9, 27, 81].into_iter().find_map(without_folder).unwrap();
     let read = |path: &str| get(process.address(), path).unwrap();
     let wait = || std::thread::sleep(Duration::from_millis(100));
-    assert!((0..900).inspect(|_| wait()).any(|_| read("/ready").body.contains("the last scheduled backup failed")));
+    assert!((0..900).inspect(|_| wait()).any(|_| read("/ready").body.contains("The last scheduled backup failed")));
     assert_eq!(read("/ready").status, 200);
     assert!(read("/metrics").body.contains("gaitwright_scheduled_backup_failed 1"));
     let page = read("/system").body;

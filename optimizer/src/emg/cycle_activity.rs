@@ -85,7 +85,10 @@ impl CycleActivity {
         same.ok_or_else(|| ModelError::Unknown {
             field: "channel".to_owned(),
             value: self.channel.clone(),
-            known: format!("one of {}", gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", ")),
+            known: format!(
+                "one of {}, the channels of the other recording",
+                gait.iter().map(|a| a.channel.as_str()).collect::<Vec<_>>().join(", ")
+            ),
         })
     }
 

@@ -29,11 +29,11 @@ impl Gait {
                 .map_err(|reason| ModelError::Malformed { what: format!("gait, domain {}", domain.name()), reason })?;
             elapsed += trajectory.duration_s;
         }
-        for (field, found, expected) in [
-            ("stride_time_s", self.stride_time_s, elapsed),
-            ("speed_m_s", self.speed_m_s, self.stride_length_m / elapsed),
+        for (field, found, expected, of) in [
+            ("stride_time_s", self.stride_time_s, elapsed, ("s", "the sum of the durations of the domains")),
+            ("speed_m_s", self.speed_m_s, self.stride_length_m / elapsed, ("m/s", "the stride length per stride time")),
         ] {
-            ModelError::check_range(field, found, expected - ROUNDING, expected + ROUNDING)?;
+            ModelError::check_related_range(field, found, (expected - ROUNDING, expected + ROUNDING), of)?;
         }
         Ok(())
     }

@@ -193,7 +193,7 @@ impl ProblemKind {
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "The learner failed",
                 "The learner found no solution for the settings and answers of the study.",
-                "Change the learner setting that the detail names.",
+                "Create a new study with other learner settings.",
             ),
             Self::TooManyAttempts => entry(
                 "/problems/too-many-attempts",

@@ -42,7 +42,7 @@ pub(super) async fn receive(request: Request, limit: usize) -> Result<Request, E
     let too_large = || {
         Error::TooLarge(format!(
             "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {MEASUREMENT_FILE_LIMIT_BYTES} for uploads of \
-             measurement files, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
+             measurement files and reference gaits, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
         ))
     };
     let announced = body.size_hint().lower();

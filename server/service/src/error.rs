@@ -125,7 +125,8 @@ pub enum Error {
     Invalid(Box<FieldError>),
     /// A cursor that came from another list, or from the same list with other filters or another order.
     #[error(
-        "The cursor is not of this list with these filters and this order. Send the `next` of a page of the same list."
+        "This cursor belongs to another list, or to this list with other filters or in another order. Send the value of \
+         `next` from a page with the same path, filters and order."
     )]
     CursorOfAnotherList(String),
     /// The request has no valid credential.

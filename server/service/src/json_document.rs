@@ -70,7 +70,11 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
     let place = place(&inner, &path, bytes);
     if !inner.is_data() {
         let known = written != "." && path.iter().all(|segment| !matches!(segment, Segment::Unknown));
-        let within = if known { format!("The field {written} is not JSON") } else { "The text is not JSON".to_owned() };
+        let within = if known {
+            format!("The field {written} cannot be read as JSON")
+        } else {
+            "The text is not JSON".to_owned()
+        };
         return Error::Malformed(format!("{within}: {message}{place}."));
     }
     let missing = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
@@ -290,7 +294,7 @@ mod tests {
         let text = refusal::<gait_learner::LearnerSettings>(r#"{"start": false}"#);
         assert!(text.starts_with("The field start is false (line 1, column ") && text.contains("it must be"), "{text}");
         let broken = refusal::<gait_learner::LearnerSettings>(r#"{"start": fals}"#);
-        assert!(broken.starts_with("The field start is not JSON"), "{broken}");
+        assert!(broken.starts_with("The field start cannot be read as JSON"), "{broken}");
     }
 
     #[test]
@@ -376,11 +380,11 @@ mod tests {
             ),
             (
                 r#"{"limits": {"friction": NaN}}"#,
-                "The field limits.friction is not JSON: expected value (line 1, column 25).",
+                "The field limits.friction cannot be read as JSON: expected value (line 1, column 25).",
             ),
             (
                 r#"{"limits": {"friction": 1e999}}"#,
-                "The field limits.friction is not JSON: number out of range (line 1, column 29).",
+                "The field limits.friction cannot be read as JSON: number out of range (line 1, column 29).",
             ),
             ("{} {}", "There is text after the JSON document: trailing characters at line 1 column 4."),
             ("{", "The text is not JSON: EOF while parsing an object (line 1, column 1)."),

@@ -71,7 +71,7 @@ fn options_with_solver(text: &str) -> Result<SolveOptions, Error> {
     json_document::read::<NlpSettings>(text.as_bytes())?;
     let solver: Value = json_document::read(text.as_bytes())?;
     let options: SolveOptions =
-        serde_json::from_value(json!({ "solver": solver })).map_err(|e| Error::Malformed(e.to_string()))?;
+        serde_json::from_value(json!({ "solver": solver })).map_err(|e| Error::Malformed(format!("{e}.")))?;
     options.validate()?;
     Ok(options)
 }

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// The script of axe-core. Its licence prevents including it here, so `.ci/run` downloads it.
 pub(crate) struct Axe(String);
 
+/// How often a page is read that changes meanwhile.
+const READINGS: usize = 5;
+
 impl Axe {
     /// `None` if axe-core is not installed and not required.
     pub(crate) fn find() -> Option<Self> {
@@ -25,15 +28,25 @@ impl Axe {
         for scheme in ["light", "dark"] {
             page.prefer("prefers-color-scheme", scheme).await;
             page.define(&self.0).await;
-            let found = page
-                .value(
-                    "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }) \
-                     .then(r => r.violations.flatMap(v => v.nodes.map(n => v.id + ': ' + n.html.slice(0, 120))))",
-                )
-                .await;
-            let found: Vec<String> = serde_json::from_str(&found).unwrap();
+            let found = self.read(page).await;
             complaints.extend(found.into_iter().map(|complaint| format!("{scheme}: {complaint}")));
         }
         complaints
+    }
+
+    /// The findings on a page as it is. A page that updates itself can replace an element while axe-core reads it, which
+    /// then throws; the next reading finds the new element.
+    async fn read(&self, page: &Tab) -> Vec<String> {
+        let run = "axe.run({ runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] }) \
+                   .then(r => r.violations.flatMap(v => v.nodes.map(n => v.id + ': ' + n.html.slice(0, 120)))) \
+                   .catch(error => String(error))";
+        let mut found = String::new();
+        for _ in 0..READINGS {
+            found = page.value(run).await;
+            if let Ok(complaints) = serde_json::from_str(&found) {
+                return complaints;
+            }
+        }
+        panic!("axe-core cannot read the page: {found}");
     }
 }

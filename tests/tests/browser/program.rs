@@ -69,8 +69,9 @@ async fn browser_leads_from_an_empty_folder_to_a_recommended_gait_with_the_progr
     page.wait_until(&format!("{phase} !== {before:?}")).await;
     page.wait_for("[data-part=best] a[download][href*=controller]").await;
     page.click("[data-part=best] a.button").await;
+    page.wait_until("location.pathname.startsWith('/trials/')").await;
+    page.wait_until("document.querySelectorAll('svg.chart').length >= 12").await;
     page.wait_for(".walker svg.gait-walker").await;
-    assert!(page.count("svg.chart").await >= 12);
     page.is_clean(&origin).await;
     browser.close().await;
     drop(program);

@@ -46,10 +46,10 @@ pub(crate) async fn ready(State(app): State<AppState>) -> Result<String, Refusal
     // Below the reserve, answers still fit and only large work is refused.
     if let Err(shortage) = app.store().check_free_space() {
         // Writing to a String cannot fail.
-        let _ = write!(text, "; {shortage}");
+        let _ = write!(text, "\n{shortage}");
     }
     if app.backups.scheduled().is_some_and(|backups| backups.failure().is_some()) {
-        text.push_str("; the last scheduled backup failed: see the System page");
+        text.push_str("\nThe last scheduled backup failed. See the System page.");
     }
     Ok(text)
 }

@@ -150,7 +150,9 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
     let (snapshot, ranking) = app.compute(rank).await?;
     let ranking = ranking.map_err(Error::Learner)?;
     let best = *ranking.first().ok_or_else(|| {
-        Error::conflict("The study has no recommendation yet, because it has no gait or no preference.")
+        Error::conflict(
+            "The study has no recommendation yet, because it has no preference, or no gait without a safety report.",
+        )
     })?;
     let mut reader = app.read().await?;
     let without_certificate = certified_best::of_ranking(&mut reader, &ranking).await?.without_certificate;
@@ -166,7 +168,7 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<Recommendation, Refusal
             "The study has no recommendation yet, because its best gait is being certified. Try again later.".to_owned()
         } else {
             format!(
-                "The study has no recommendation, because its best gait has no certificate. Request one with POST /api/v1/trials/{best}/certificate."
+                "The study has no recommendation, because none of its gaits is walkable. If its best gait has no certificate, request one with POST /api/v1/trials/{best}/certificate."
             )
         };
         return Err(Error::conflict(why).into());

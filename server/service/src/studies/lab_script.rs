@@ -183,7 +183,7 @@ pub async fn check_result(store: &mut Store, id: TrialId, tell: &TellRequest) ->
     let mut db = store.read().await?;
     let trial = trials::get(&mut db, id).await?;
     if trial.script.is_none() {
-        return Err(Error::conflict("The service evaluates this trial itself."));
+        return Err(Error::conflict("The service evaluates this trial itself, so a script cannot report its result."));
     }
     if trial.state != TrialState::Running {
         return Err(Error::conflict(format!(

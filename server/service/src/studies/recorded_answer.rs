@@ -208,7 +208,10 @@ pub(super) async fn replace(
         return Err(Error::conflict("A safety report cannot be changed. Staff will review it and can clear the gait."));
     }
     if !answer.retract(writer, author, CHANGED).await? {
-        return Err(Error::conflict("The answer to change was already changed or retracted."));
+        return Err(Error::conflict(
+            "The answer that you want to change was already changed or retracted. Check the answers of the study before you \
+             try again.",
+        ));
     }
     Ok(if answer.is_in_force_by(author) { SecondAnswer::Allowed } else { SecondAnswer::Refused })
 }

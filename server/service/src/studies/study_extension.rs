@@ -12,6 +12,9 @@ use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
 
+/// Largest number of trials of a study.
+const MOST_TRIALS: i64 = 10_000;
+
 /// A larger number of trials.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -24,11 +27,16 @@ pub struct StudyExtension {
 /// Raises the number of trials of a study. If the study has ended, it resumes.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the number of trials would not increase, [`Error::NotFound`].
+/// [`Error::Invalid`] if the number of trials would not increase, [`Error::Conflict`] if it cannot, [`Error::NotFound`].
 pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &StudyExtension) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let least = i64::from(study.plan.number_of_trials) + 1;
-    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, 10_000)?;
+    if least > MOST_TRIALS {
+        return Err(Error::conflict(format!(
+            "The study has {MOST_TRIALS} trials already, which is the largest number."
+        )));
+    }
+    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, MOST_TRIALS)?;
     let state = match study.state {
         ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, StudyTransition::Extend)?,
         other => other,
@@ -48,7 +56,7 @@ pub(super) async fn raise_number_of_trials(
     number_of_trials: u32,
     state: StudyState,
 ) -> Result<(), Error> {
-    study_plan::check_range("number_of_trials", i64::from(number_of_trials), 1, 10_000)?;
+    study_plan::check_range("number_of_trials", i64::from(number_of_trials), 1, MOST_TRIALS)?;
     let limits = StudyLimits {
         name: study.plan.name.clone(),
         priority: study.plan.priority,

@@ -133,7 +133,7 @@ pub enum NotWalkable {
     },
     /// The study came from an archive without a trusted signature, and no certificate passed here.
     #[error(
-        "Trial {number} belongs to a study from an archive without a trusted signature. Such a gait must not be used \
+        "Trial {number} belongs to a study from an archive without a trusted signature. Its gait must not be used \
          for walking or compared unless it has passed certification on this service."
     )]
     Unconfirmed {

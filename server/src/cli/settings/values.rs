@@ -55,9 +55,9 @@ impl Settings {
     pub(in crate::cli) fn workers(&self) -> Result<Option<usize>, Error> {
         match self.text("workers") {
             "cores" => Ok(None),
-            _ => match self.parsed("workers", "1 to 64")? {
+            _ => match self.parsed("workers", "1 to 64, or \"cores\"")? {
                 workers @ 1..=64 => Ok(Some(workers)),
-                _ => Err(self.refused("workers", "1 to 64")),
+                _ => Err(self.refused("workers", "1 to 64, or \"cores\"")),
             },
         }
     }

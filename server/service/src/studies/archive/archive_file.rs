@@ -193,7 +193,11 @@ impl<R: Read> Unpacker<R> {
         if text.pop() != Some(b'\n') {
             return Err(refuse("it is truncated"));
         }
-        let line: ArchiveLine = serde_json::from_slice(&text).map_err(|e| refuse(format!("row {row}: {e}")))?;
+        let line: ArchiveLine = serde_json::from_slice(&text).map_err(|error| {
+            let message = error.to_string();
+            // The position is that within the row.
+            refuse(format!("row {row}: {}", message.split(" at line ").next().unwrap_or(&message)))
+        })?;
         match line {
             ArchiveLine { table: Some(name), sha256: Some(sha256), row: Some(found), end: None } => {
                 self.hash.update(&text);
