@@ -49,7 +49,10 @@ pub async fn fill(database: &Path) {
     for (path, body) in [
         (retract, json!({"reason": "mistyped"})),
         (format!("/api/v1/subjects/{}/consents", service.subject().await), json!({"form": "form 3"})),
-        (format!("/api/v1/studies/{study}/raters/unblind"), json!({"rater": "not signed in", "reason": "asked"})),
+        (
+            format!("/api/v1/studies/{study}/raters/unblind"),
+            json!({"rater": "somebody not signed in", "reason": "asked"}),
+        ),
         ("/api/v1/users".to_owned(), json!({"name": "R1", "role": "rater"})),
         ("/api/v1/tokens".to_owned(), json!({"name": "rig", "scopes": ["read"]})),
     ] {

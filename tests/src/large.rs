@@ -5,6 +5,7 @@ use crate::service::Service;
 use axum::http::StatusCode;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::{Store, StudyId, TrialId, commit};
+use serde_json::Value;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -102,6 +103,17 @@ pub async fn answer_often(database: &Path, study: StudyId, answers: u32) {
     store.close().await;
 }
 
+/// The address of a page of a list after its first 9,000 entries.
+async fn far_page(service: &Service, list: &str) -> String {
+    let mut path = format!("{list}?limit=1000");
+    let mut cursor = Value::Null;
+    for _ in 0..9 {
+        cursor = service.fetch(&path).await.json()["next"].take();
+        path = format!("{list}?limit=1000&cursor={}", cursor.as_str().unwrap());
+    }
+    format!("{list}?limit=200&cursor={}", cursor.as_str().unwrap())
+}
+
 /// Each page and list, with the shortest of three response times.
 pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(String, Duration)> {
     let api = format!("/api/v1/studies/{study}");
@@ -117,8 +129,8 @@ pub async fn times(service: &Service, study: StudyId, trial: TrialId) -> Vec<(St
         format!("/trials/{trial}"),
         "/api/v1/studies".to_owned(),
         api.clone(),
-        format!("{api}/trials?cursor=39303030"),
-        format!("{api}/preferences?cursor=39303030&limit=200"),
+        far_page(service, &format!("{api}/trials")).await,
+        far_page(service, &format!("{api}/preferences")).await,
         format!("{api}/raters"),
         "/api/v1/audit".to_owned(),
         "/metrics".to_owned(),

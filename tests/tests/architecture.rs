@@ -58,13 +58,25 @@ const WALLS: [(&str, &str, &[&str]); 29] = [
         "execution/",
         &["gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "certificate"],
     ),
-    ("optimizer/src", "export/", &["gait_problem", "initial_guess", "solve", "certificate", "execution"]),
-    ("optimizer/src", "reference/", &["gait", "gait_problem", "initial_guess", "solve", "certificate", "execution"]),
-    ("optimizer/src", "emg/", &["gait_problem", "initial_guess", "solve", "certificate", "execution"]),
+    (
+        "optimizer/src",
+        "export/",
+        &["gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "certificate", "execution"],
+    ),
+    (
+        "optimizer/src",
+        "reference/",
+        &["gait", "gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "certificate", "execution"],
+    ),
+    (
+        "optimizer/src",
+        "emg/",
+        &["gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "certificate", "execution"],
+    ),
     (
         "optimizer/src",
         "phase_portrait",
-        &["gait", "gait_problem", "initial_guess", "solve", "certificate", "execution"],
+        &["gait", "gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "certificate", "execution"],
     ),
 ];
 

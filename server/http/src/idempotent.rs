@@ -186,7 +186,12 @@ impl<P: RequiredRight, S: Send + Sync> FromRequest<S> for Idempotent<P> {
     type Rejection = Refusal;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
-        Ok(read(request, state).await?.0)
+        let (idempotent, _, _, bytes) = read(request, state).await?;
+        // A field that nobody reads would be ignored without a word.
+        if !matches!(bytes.trim_ascii(), b"" | b"{}") {
+            return Err(Error::Malformed("This operation takes no fields. Send no body, or {}.".to_owned()).into());
+        }
+        Ok(idempotent)
     }
 }
 

@@ -8,11 +8,18 @@ use axum::http::header;
 use futures_util::StreamExt;
 use gaitwright_service::error::Error;
 
-/// Routes that take measurement files and recordings.
-const UPLOADS: [&str; 6] = [
+/// Pages whose forms take measurement files and recordings.
+const UPLOAD_PAGES: [&str; 3] = [
     "/reference-gaits",
     "/lab-sessions/{id}/measurement-files/emg",
     "/lab-sessions/{id}/measurement-files/joint-angles",
+];
+
+/// How many times its size a file can take in a form, where three bytes stand for a comma or the end of a line.
+const GROWTH_IN_FORM: usize = 2;
+
+/// Operations that take measurement files and recordings.
+const UPLOADS: [&str; 3] = [
     "/api/v1/reference-gaits",
     "/api/v1/lab-sessions/{id}/measurement-files/emg",
     "/api/v1/lab-sessions/{id}/measurement-files/joint-angles",
@@ -24,9 +31,21 @@ pub(super) fn limit(request: &Request, is_signed_in: bool) -> usize {
     match route {
         _ if !is_signed_in => ANONYMOUS_BODY_LIMIT_BYTES,
         Some(route) if UPLOADS.contains(&route) => MEASUREMENT_FILE_LIMIT_BYTES,
+        Some(route) if UPLOAD_PAGES.contains(&route) => GROWTH_IN_FORM * MEASUREMENT_FILE_LIMIT_BYTES,
         _ => BODY_LIMIT_BYTES,
     }
 }
+
+fn size_in_words(bytes: usize) -> String {
+    match bytes {
+        whole if whole >= MIB && whole.is_multiple_of(MIB) => format!("{} MiB", whole / MIB),
+        whole if whole >= KIB && whole.is_multiple_of(KIB) => format!("{} KiB", whole / KIB),
+        other => format!("{other} bytes"),
+    }
+}
+
+const KIB: usize = 1024;
+const MIB: usize = 1024 * KIB;
 
 /// How many times the limit of a body that is too large is still received. A client that sends its whole body before it
 /// reads the answer would otherwise see only a broken connection.
@@ -39,12 +58,7 @@ const DISCARDED: usize = 4;
 /// [`Error::TooLarge`], and [`Error::Malformed`] if the body breaks off.
 pub(super) async fn receive(request: Request, limit: usize) -> Result<Request, Error> {
     let (parts, body) = request.into_parts();
-    let too_large = || {
-        Error::TooLarge(format!(
-            "The body is too large. The limit is {BODY_LIMIT_BYTES} bytes, {MEASUREMENT_FILE_LIMIT_BYTES} for uploads of \
-             measurement files and reference gaits, and {ANONYMOUS_BODY_LIMIT_BYTES} without sign-in."
-        ))
-    };
+    let too_large = || Error::TooLarge(format!("The body is too large. The limit here is {}.", size_in_words(limit)));
     let announced = body.size_hint().lower();
     let waits_for_answer = parts.headers.contains_key(header::EXPECT);
     if announced > limit as u64 && (waits_for_answer || announced > (limit * DISCARDED) as u64) {
@@ -102,7 +116,7 @@ mod tests {
             schema.is_some_and(|schema| schema["properties"].get("recording").is_some())
         };
         let described: Vec<&String> = document["paths"].as_object().unwrap().keys().filter(takes_recording).collect();
-        let uploads: BTreeSet<&str> = UPLOADS.into_iter().filter(|route| route.starts_with("/api/")).collect();
+        let uploads: BTreeSet<&str> = UPLOADS.into_iter().collect();
         assert_eq!(described.into_iter().map(String::as_str).collect::<BTreeSet<_>>(), uploads);
     }
 

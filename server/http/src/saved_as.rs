@@ -41,10 +41,9 @@ fn taken_from(uri: &Uri) -> Result<Option<(String, Uri)>, Error> {
         _ => return Err(Error::Malformed(query_string::occurs_twice(PARAMETER))),
     };
     if !is_allowed(&name) {
-        return Err(Error::Malformed(format!(
-            "The query parameter {PARAMETER} is {name:?}; it must be the name of a .json file: at most {LONGEST} letters, \
-             digits, dots, hyphens and underscores."
-        )));
+        let allowed =
+            format!("the name of a .json file: at most {LONGEST} letters, digits, dots, hyphens and underscores");
+        return Err(Error::invalid(PARAMETER, name, &allowed));
     }
     let path = uri.path();
     let rest = if others.is_empty() { path.to_owned() } else { format!("{path}?{}", others.join("&")) };

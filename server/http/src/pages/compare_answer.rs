@@ -10,6 +10,7 @@ use axum::response::Redirect;
 use gaitwright_service::access::{self, Caller};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
+use gaitwright_service::studies::answer_giver::AnswerGiver;
 use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::feedback_log::{self, CurrentAnswer};
 use gaitwright_service::studies::preference_answer::{self, Answer, PairAnswer};
@@ -17,7 +18,6 @@ use gaitwright_service::studies::recorded_answer::RecordedAnswer;
 use gaitwright_service::studies::reported_gaits::SafetyReports;
 use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::blind_pairs::OrderedAnswer;
-use gaitwright_store::feedback::Source;
 use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};
 use gaitwright_store::{AnswerId, Connection, FeedbackId, StudyId, commit};
 use serde::Deserialize;
@@ -71,8 +71,7 @@ impl AnswerForm {
     }
 
     fn read(&self) -> Result<(GivenAnswer, FeedbackId), Error> {
-        let source = Source::from_str(&self.source)
-            .map_err(|_| Error::invalid("source", self.source.as_str(), "subject, clinician or script"))?;
+        let source = AnswerGiver::from_str(&self.source)?;
         let (a, b) = (identifier("trial_a", &self.a)?, identifier("trial_b", &self.b)?);
         let (source, author, note) = (Some(source), Some(self.author.clone()), self.note.clone());
         let replaces = self.changed()?;

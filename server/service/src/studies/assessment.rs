@@ -1,6 +1,7 @@
 //! Records and retracts assessments: answers of staff about two gaits that state no preference (cannot tell, or
 //! unsafe).
 
+use super::answer_giver::AnswerGiver;
 use super::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use super::preference_answer::attribution;
 use super::recorded_answer;
@@ -8,7 +9,7 @@ use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::assessments::{self, Assessment, AssessmentAnswer};
-use gaitwright_store::feedback::{Origin, Source};
+use gaitwright_store::feedback::Origin;
 use gaitwright_store::{AnswerId, AssessmentId, StudyId, TrialId, Writer, audit, consents, events, feedback, studies};
 use serde::Deserialize;
 use serde_json::json;
@@ -28,7 +29,7 @@ pub struct NewAssessment {
     /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
-    pub source: Option<Source>,
+    pub source: Option<AnswerGiver>,
     /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]

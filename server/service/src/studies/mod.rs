@@ -6,6 +6,7 @@
 
 pub mod actions_with_known_gait;
 pub mod analysis;
+pub mod answer_giver;
 pub mod archive;
 pub mod assessment;
 pub mod atlas;

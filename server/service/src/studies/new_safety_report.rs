@@ -1,11 +1,12 @@
 //! Records a report that one gait is unsafe. Takes effect at once: the gait, and every trial of the subject with the same
 //! motion, is neither recommended nor compared nor walked until staff have cleared the gait.
 
+use super::answer_giver::AnswerGiver;
 use super::preference_answer::attribution;
 use super::walkable::NotWalkable;
 use crate::access::Caller;
 use crate::error::Error;
-use gaitwright_store::feedback::{Attribution, Source};
+use gaitwright_store::feedback::Attribution;
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{SafetyReportId, StoreResult, TrialId, Writer, audit, consents, events, safety_reports, trials};
 use serde::Deserialize;
@@ -20,7 +21,7 @@ pub struct NewSafetyReport {
     /// Who reports: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
-    pub source: Option<Source>,
+    pub source: Option<AnswerGiver>,
     /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]

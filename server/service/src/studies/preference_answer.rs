@@ -1,5 +1,6 @@
 //! Records and retracts preferences from people and scripts, for pages and REST.
 
+use super::answer_giver::AnswerGiver;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -56,7 +57,7 @@ pub struct Answer {
     /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
-    pub source: Option<Source>,
+    pub source: Option<AnswerGiver>,
     /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
@@ -112,14 +113,11 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, answer: 
 /// [`Error::Invalid`] for `source`, `author` or `note`.
 pub fn attribution<'a>(
     caller: &'a Caller,
-    source: Option<Source>,
+    source: Option<AnswerGiver>,
     author: Option<&'a str>,
     note: &'a str,
 ) -> Result<Attribution<'a>, Error> {
-    let source = source.unwrap_or_else(|| caller.source());
-    if !matches!(source, Source::Subject | Source::Clinician | Source::Script) {
-        return Err(Error::invalid("source", source.as_str(), "subject, clinician or script"));
-    }
+    let source = source.map_or_else(|| caller.source(), Source::from);
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     // A signed-in user cannot answer as another clinician.
     if caller.user.is_some() && source == Source::Clinician && author != caller.name {

@@ -1,11 +1,11 @@
 //! Records suggestions (coactive feedback): bounds with which a gait would have been better than that of a trial.
 
+use super::answer_giver::AnswerGiver;
 use super::feedback_log;
 use super::preference_answer::{attribution, comparable};
 use crate::access::Caller;
 use crate::error::Error;
 use gait_learner::ActionIndex;
-use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{FeedbackId, StudyId, TrialId, Writer, audit, events, studies};
@@ -26,7 +26,7 @@ pub struct Suggestion {
     /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
-    pub source: Option<Source>,
+    pub source: Option<AnswerGiver>,
     /// Name or pseudonym of the author. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
