@@ -7,7 +7,7 @@ mod synthetic_recordings;
 
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::EmgRecording;
-use gait_optimizer::phase_portrait::JointRecording;
+use gait_optimizer::limit_cycle::JointRecording;
 use gait_optimizer::reference::MotionRecording;
 use synthetic_recordings::{camargo, electromyogram, opensim, own_table};
 

@@ -75,7 +75,7 @@ const WALLS: [(&str, &str, &[&str]); 29] = [
     ),
     (
         "optimizer/src",
-        "phase_portrait",
+        "limit_cycle",
         &["gait", "gait_problem", "initial_guess", "solve", "explanation", "sensitivity", "certificate", "execution"],
     ),
 ];

@@ -213,6 +213,7 @@ async fn known(scene: &Scene) -> BTreeMap<&'static str, Vec<Value>> {
     known.insert("device_id", vec![devices[0]["id"].clone()]);
     known.insert("reference_gait_id", vec![json!(scene.service.reference().await)]);
     known.insert("rater", vec![rater[0]["rater"].clone()]);
+    known.insert("replaces", vec![Value::Null]);
     // Studies that are created here must not start.
     known.insert("start", vec![json!(false)]);
     known

@@ -118,10 +118,10 @@ class OrbitCursor {
   /** @param {SVGSVGElement} chart */
   constructor(chart) {
     const layer = layerOver(chart);
-    this.orbits = String(chart.dataset.moments)
+    this.limitCycles = String(chart.dataset.moments)
       .split(",")
-      .map((orbit) => {
-        const [colour, ...numbers] = orbit.split(" ");
+      .map((limitCycle) => {
+        const [colour, ...numbers] = limitCycle.split(" ");
         const dot = document.createElementNS(SVG, "circle");
         dot.setAttribute("class", `cursor_dot ${colour}`);
         dot.setAttribute("r", "6");
@@ -131,7 +131,7 @@ class OrbitCursor {
   }
 
   draw() {
-    for (const { dot, numbers } of this.orbits) {
+    for (const { dot, numbers } of this.limitCycles) {
       const moment = Math.round(now * (numbers.length / 2 - 1));
       dot.setAttribute("cx", numbers[2 * moment]);
       dot.setAttribute("cy", numbers[2 * moment + 1]);

@@ -13,7 +13,7 @@ mod solve_charts;
 
 pub use group::Group;
 pub use joint_angles::{of_reference, with_reference};
-pub use limit_cycles::{orbit, orbits};
+pub use limit_cycles::{limit_cycle, limit_cycles};
 pub use solve_charts::solve;
 
 use crate::{Animation, Chart, Figure, GaitWalker, Stroke};
@@ -60,7 +60,7 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
         groups.push(muscle_states::fibre_lengths(&cycle));
     }
     groups.push(progress_of(&cycle, gait)?);
-    groups.push(limit_cycles::portraits(&cycle));
+    groups.push(limit_cycles::limit_cycle_group(&cycle));
     Ok(groups)
 }
 

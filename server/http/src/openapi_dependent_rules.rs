@@ -26,6 +26,7 @@ const REFERENCE_FILE: &str = "A file in the format that `format` names, with its
 
 /// Component, field, and the rule.
 const AUTHOR: &str = "The name of the signed-in user, unless `source` is `subject` or `script`.";
+const REPLACED: &str = "An answer of this study to the same comparison, which counts, by the same author.";
 /// Query parameter and the rule.
 const PARAMETER_RULES: [(&str, &str); 3] = [
     ("cursor", "The value of `next` from a page of this list with the same filters and order."),
@@ -33,7 +34,9 @@ const PARAMETER_RULES: [(&str, &str); 3] = [
     ("y", "A bound of the study's search space, and not that of `x`."),
 ];
 
-const RULES: [(&str, &str, &str); 31] = [
+const RULES: [(&str, &str, &str); 33] = [
+    ("NewPreference", "replaces", REPLACED),
+    ("NewAssessment", "replaces", REPLACED),
     ("NewPreference", "author", AUTHOR),
     ("NewAssessment", "author", AUTHOR),
     ("NewSafetyReport", "author", AUTHOR),

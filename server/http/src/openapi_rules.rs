@@ -26,7 +26,7 @@ const UNPRINTABLE: &str =
     r"\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069";
 
 /// Names: component, field and maximum length.
-const NAMES: [(&str, &str, u32); 12] = [
+const NAMES: [(&str, &str, u32); 13] = [
     ("NewUser", "name", 80),
     ("NewToken", "name", 80),
     ("RaterInvitation", "name", 80),
@@ -39,6 +39,7 @@ const NAMES: [(&str, &str, u32); 12] = [
     ("NewAssessment", "author", 80),
     ("NewSafetyReport", "author", 80),
     ("Suggestion", "author", 80),
+    ("AnswerUndo", "author", 80),
 ];
 
 /// Parameters with rules.

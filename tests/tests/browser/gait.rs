@@ -53,9 +53,15 @@ async fn browser_gait_is_shown_completely_with_coloured_muscles() {
     let (site, trial) = with_a_gait().await;
     let page = browser.open_without_scripts(&site.at(&format!("/trials/{trial}"))).await;
     // Each leg over its own cycle; the stride as pictures.
-    for (group, charts) in
-        [("angles", 4), ("forces", 2), ("torques", 3), ("powers", 3), ("muscles", 7), ("fibres", 7), ("portraits", 4)]
-    {
+    for (group, charts) in [
+        ("angles", 4),
+        ("forces", 2),
+        ("torques", 3),
+        ("powers", 3),
+        ("muscles", 7),
+        ("fibres", 7),
+        ("limit-cycles", 4),
+    ] {
         assert_eq!(page.count(&format!("#{group} svg.chart")).await, charts, "{group}");
     }
     assert_eq!(page.count("#powers tbody tr").await, 6);

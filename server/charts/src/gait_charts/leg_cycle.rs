@@ -7,7 +7,7 @@ use gait_optimizer::Gait;
 /// Colour of the right leg, as in the stick figures; the left one has the first colour.
 pub(super) const RIGHT: usize = 3;
 
-/// Number of moments of a stride at which the cursor is shown on an orbit.
+/// Number of moments of a stride at which the cursor is shown on a limit cycle.
 const MOMENTS: usize = 101;
 
 /// The points of a gait on the axis of the gait cycle.
@@ -69,13 +69,13 @@ impl<'a> Cycle<'a> {
         line(self.points.iter(), |point| 100.0 * point.time_s / self.end, y, |_| true)
     }
 
-    /// The orbit of a coordinate, °, °/s, with a gap where an impact makes its velocity jump: before each double support.
-    pub(super) fn orbit(&self, q: usize) -> Vec<(f64, f64)> {
+    /// The limit cycle of a coordinate, °, °/s, with a gap where an impact makes its velocity jump: before each double support.
+    pub(super) fn limit_cycle(&self, q: usize) -> Vec<(f64, f64)> {
         let (angle, velocity) = (|p: &Point<'_>| p.q[q].to_degrees(), |p: &Point<'_>| p.qd[q].to_degrees());
         line(self.points.iter(), angle, velocity, |domain| domain.starts_with("DS"))
     }
 
-    /// The orbit of a coordinate at equal shares of the stride, °, °/s.
+    /// The limit cycle of a coordinate at equal shares of the stride, °, °/s.
     pub(super) fn moments(&self, q: usize) -> Vec<(f64, f64)> {
         let at = |moment: usize| {
             let time = self.end * moment as f64 / (MOMENTS - 1) as f64;

@@ -13,11 +13,11 @@ const COORDINATES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 
 /// Angle and velocity of each joint over the stride.
-pub(super) fn portraits(cycle: &Cycle<'_>) -> Group {
+pub(super) fn limit_cycle_group(cycle: &Cycle<'_>) -> Group {
     let (angle, velocity) = ("angle, °", "velocity, °/s");
     let with = |mut chart: Chart, label: &str, colour: usize, stroke: Stroke, q: usize| {
         chart.moments.push((colour, cycle.moments(q)));
-        chart.with(label, colour, stroke, cycle.orbit(q))
+        chart.with(label, colour, stroke, cycle.limit_cycle(q))
     };
     let joint = |(place, title): (usize, &&str)| {
         [(Leg::Left, Side::Left), (Leg::Right, Side::Right)]
@@ -29,23 +29,23 @@ pub(super) fn portraits(cycle: &Cycle<'_>) -> Group {
     let mut charts: Vec<Chart> = JOINTS.iter().enumerate().map(joint).collect();
     charts.push(with(Chart::new("Torso lean", angle, velocity), "torso", 7, Stroke::Solid, 2));
     let hint = "Joint angle and velocity over the stride. A closed curve is a periodic motion; a gap is an impact.";
-    Group::new("portraits", "Limit cycles", hint, charts)
+    Group::new("limit-cycles", "Limit cycles", hint, charts)
 }
 
-/// The orbits of each joint, with the orbits of all gaits in one chart. Each gait comes with its name.
-pub fn orbits(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
+/// The limit cycles of each joint, with the limit cycles of all gaits in one chart. Each gait comes with its name.
+pub fn limit_cycles(gaits: &[(&str, &Gait)]) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
     let draw = |(place, title): (usize, &&str)| {
         let mut chart = Chart::new(title, "angle, °", "velocity, °/s");
         for (colour, (name, gait)) in gaits.iter().enumerate() {
-            chart = chart.with(name, colour, stroke(colour), Cycle::of(gait).orbit(place + 2));
+            chart = chart.with(name, colour, stroke(colour), Cycle::of(gait).limit_cycle(place + 2));
         }
         chart
     };
     if gaits.is_empty() { Vec::new() } else { COORDINATES.iter().enumerate().map(draw).collect() }
 }
 
-/// The orbit of a coordinate of a gait, °, °/s.
-pub fn orbit(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
-    Cycle::of(&drawn(gait)).orbit(coordinate)
+/// The limit cycle of a coordinate of a gait, °, °/s.
+pub fn limit_cycle(gait: &Gait, coordinate: usize) -> Vec<(f64, f64)> {
+    Cycle::of(&drawn(gait)).limit_cycle(coordinate)
 }

@@ -2,8 +2,8 @@
 
 use gait_optimizer::Gait;
 use gait_optimizer::emg::CycleActivity;
-use gait_optimizer::phase_portrait::JOINTS;
-use gaitwright_charts::gait_charts::orbit;
+use gait_optimizer::limit_cycle::JOINTS;
+use gaitwright_charts::gait_charts;
 use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_service::studies::lab::{EmgView, LabSessionView, LimitCycles, WalkCondition};
 
@@ -89,19 +89,22 @@ fn look(walk: u8) -> (usize, Stroke) {
     }
 }
 
-/// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the orbit of the gait where it is known.
+/// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the limit cycle of the gait where it is known.
 pub(crate) fn limit_cycles(session: &LabSessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
     let mut charts = Vec::new();
     for (place, joint) in JOINTS.iter().enumerate() {
         for (walk, gait) in measured {
-            let Some(portrait) = walk.joints.iter().find(|portrait| portrait.joint == *joint) else { continue };
+            let Some(limit_cycle) = walk.joints.iter().find(|limit_cycle| limit_cycle.joint == *joint) else {
+                continue;
+            };
             let name = walk_name(session, walk.walk);
-            let line = portrait.angle_rad.iter().zip(&portrait.velocity_rad_s);
+            let line = limit_cycle.angle_rad.iter().zip(&limit_cycle.velocity_rad_s);
             let line = line.map(|(angle, velocity)| (angle.to_degrees(), velocity.to_degrees())).collect();
             let title = format!("{}, {name}", JOINT_NAMES[place]);
             let mut chart = Chart::new(&title, "angle, °", "velocity, °/s").with("measured", 7, Stroke::Solid, line);
             if let Some(gait) = gait {
-                chart = chart.with("limit cycle of the gait", 1, Stroke::Solid, orbit(gait, place + 2));
+                chart =
+                    chart.with("limit cycle of the gait", 1, Stroke::Solid, gait_charts::limit_cycle(gait, place + 2));
             }
             charts.push(Figure::chart("limit-cycle", chart));
         }

@@ -26,7 +26,7 @@ pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<V
     Ok(app.compute(draw).await?)
 }
 
-/// The limit cycles of each walk, with the orbit of its gait after unblinding.
+/// The limit cycles of each walk, with the limit cycle of its gait after unblinding.
 pub(crate) async fn measured_cycles(
     store: &mut Store,
     id: LabSessionId,

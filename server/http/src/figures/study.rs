@@ -145,11 +145,11 @@ fn sections(shown: &[StudyWithBest], reference: &ReferenceGait) -> Result<Vec<Fi
             figures: tiles,
         },
         FigureSection {
-            id: "orbits",
+            id: "limit-cycles",
             heading: "Limit cycles of the best gait",
             hint: "Figure 5 of the paper: angle and velocity over the stride. The pages of lab sessions show measured limit cycles."
                 .to_owned(),
-            figures: charts("orbits", gait_charts::orbits(&gaits)),
+            figures: charts("limit-cycles", gait_charts::limit_cycles(&gaits)),
         },
     ])
 }

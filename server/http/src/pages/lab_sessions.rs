@@ -153,7 +153,7 @@ struct SessionPage {
     forms: Forms,
     filters: FilterFields,
     measured: Option<MeasuredActivity>,
-    portraits: Vec<PageChart>,
+    limit_cycles: Vec<PageChart>,
     refused: Option<String>,
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
@@ -256,7 +256,7 @@ pub(super) async fn get(
 /// The charts of a session.
 struct Drawings {
     emg: Vec<PageChart>,
-    portraits: Vec<PageChart>,
+    limit_cycles: Vec<PageChart>,
 }
 
 pub(super) async fn show(
@@ -279,7 +279,7 @@ pub(super) async fn show(
         let files = format!("/api/v1/lab-sessions/{id}/figures");
         let drawn = |figures: &[Figure]| figures.iter().map(|figure| PageChart::of(figure, &files, "")).collect();
         let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::emg(&session, emg)));
-        let drawings = Drawings { emg: of_emg, portraits: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
+        let drawings = Drawings { emg: of_emg, limit_cycles: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
         (session, emg, drawings)
     };
     let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
@@ -303,7 +303,7 @@ pub(super) async fn show(
             .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
         forms,
         measured: emg.as_ref().map(|emg| MeasuredActivity::of(&session, emg, drawings.emg)),
-        portraits: drawings.portraits,
+        limit_cycles: drawings.limit_cycles,
         refused,
         answer_in_words: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
         session,

@@ -1,6 +1,6 @@
 //! Limit cycles of lab sessions.
 
-use gait_optimizer::phase_portrait;
+use gait_optimizer::limit_cycle;
 use gaitwright_service::studies::lab;
 use gaitwright_store::MeasurementFileId;
 use serde::Serialize;
@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 /// Angle and velocity of a joint, sample by sample.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct PhasePortrait {
+pub(crate) struct LimitCycle {
     /// Name of the joint.
     joint: String,
     /// Angle, rad.
@@ -17,9 +17,9 @@ pub(crate) struct PhasePortrait {
     velocity_rad_s: Vec<f64>,
 }
 
-impl From<phase_portrait::PhasePortrait> for PhasePortrait {
-    fn from(portrait: phase_portrait::PhasePortrait) -> Self {
-        let phase_portrait::PhasePortrait { joint, angle_rad, velocity_rad_s } = portrait;
+impl From<limit_cycle::LimitCycle> for LimitCycle {
+    fn from(limit_cycle: limit_cycle::LimitCycle) -> Self {
+        let limit_cycle::LimitCycle { joint, angle_rad, velocity_rad_s } = limit_cycle;
         Self { joint, angle_rad, velocity_rad_s }
     }
 }
@@ -34,7 +34,7 @@ pub(crate) struct LimitCycles {
     /// Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
     cutoff_hz: f64,
     /// Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
-    joints: Vec<PhasePortrait>,
+    joints: Vec<LimitCycle>,
 }
 
 impl From<lab::LimitCycles> for LimitCycles {

@@ -38,7 +38,7 @@ struct SubjectFigures {
     /// Figure 4: variant and tiles.
     tiles: Vec<(&'static str, String)>,
     /// Figure 5.
-    orbits: Vec<ReportChart>,
+    limit_cycles: Vec<ReportChart>,
 }
 
 struct ReportChart {
@@ -88,7 +88,7 @@ fn pair(comparison: &PairComparison, outcomes: &[ReproducedStudy]) -> Result<Sub
         title: format!("Subject {}, seed {}", comparison.subject, comparison.seed),
         course_and_angles,
         tiles,
-        orbits: gait_charts::orbits(&gaits).iter().map(drawn).collect(),
+        limit_cycles: gait_charts::limit_cycles(&gaits).iter().map(drawn).collect(),
     })
 }
 

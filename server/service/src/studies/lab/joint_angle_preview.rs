@@ -5,13 +5,13 @@ use super::emg_preview::extremes;
 use super::file_format::WHAT;
 use super::upload::NewJointAngles;
 use crate::error::Error;
-use gait_optimizer::phase_portrait::JointRecording;
+use gait_optimizer::limit_cycle::JointRecording;
 use gait_optimizer::reference::{HeelStrikes, MotionRecording, RecordedStride};
 
 /// A preview of a recording of joint angles.
 #[derive(Debug)]
 pub struct JointAnglePreview {
-    /// Each recorded joint, one of [`gait_optimizer::phase_portrait::JOINTS`], with the smallest and the largest angle, °, of
+    /// Each recorded joint, one of [`gait_optimizer::limit_cycle::JOINTS`], with the smallest and the largest angle, °, of
     /// intervals over the time since the start, s.
     pub traces: Vec<(&'static str, Vec<(f64, f64)>)>,
     /// Right heel strikes, s; empty without the angles of torso, right hip and right knee.

@@ -9,7 +9,7 @@ use super::upload::JointAngleReading;
 use crate::error::Error;
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{Activity, CycleActivity, EmgRmse, EmgSettings, ModelActivity, model_activity};
-use gait_optimizer::phase_portrait::PhasePortrait;
+use gait_optimizer::limit_cycle::LimitCycle;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions;
@@ -186,7 +186,7 @@ pub struct LimitCycles {
     /// Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
     pub cutoff_hz: f64,
     /// Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
-    pub joints: Vec<PhasePortrait>,
+    pub joints: Vec<LimitCycle>,
 }
 
 /// The limit cycles of the newest joint angles of each walk.
@@ -205,7 +205,7 @@ pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<Lim
     let process = move |pool: &OnPool| {
         let cycles =
             |(walk, measurement_file_id, reading, file): (u8, MeasurementFileId, JointAngleReading, PackedText)| {
-                let joints = reading.portraits(&file.text(pool)?)?;
+                let joints = reading.limit_cycles(&file.text(pool)?)?;
                 Ok(LimitCycles { walk, measurement_file_id, cutoff_hz: reading.cutoff_hz, joints })
             };
         files.into_iter().map(cycles).collect()

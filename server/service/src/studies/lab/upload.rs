@@ -6,7 +6,7 @@ use super::session::{checked_walk, still_open};
 use crate::error::{Error, FieldError};
 use crate::studies::reference_import::Unit;
 use gait_optimizer::ModelError;
-use gait_optimizer::phase_portrait::{JointRecording, PhasePortrait};
+use gait_optimizer::limit_cycle::{JointRecording, LimitCycle};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::SessionStep;
@@ -53,12 +53,12 @@ impl Default for JointAngleReading {
 }
 
 impl JointAngleReading {
-    /// The phase portraits of a file.
+    /// The limit cycles of a file.
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub fn portraits(&self, text: &str) -> Result<Vec<PhasePortrait>, Error> {
-        self.joints(text)?.portraits(self.cutoff_hz).map_err(|error| match error {
+    pub fn limit_cycles(&self, text: &str) -> Result<Vec<LimitCycle>, Error> {
+        self.joints(text)?.limit_cycles(self.cutoff_hz).map_err(|error| match error {
             ModelError::OutOfRange { .. } => FieldError::from(error).within("reading").into(),
             other => other.into(),
         })
@@ -71,11 +71,11 @@ impl JointAngleReading {
         })
     }
 
-    /// Checks that a file gives a limit cycle and phase portraits with these settings.
+    /// Checks that a file gives a limit cycle and limit cycles with these settings.
     pub(super) fn check(&self, text: &str) -> Result<(), Error> {
         check_file_name(self.file_name.as_deref())?;
         self.joints(text)?.check_walking(WHAT)?;
-        self.portraits(text).map(|_| ())
+        self.limit_cycles(text).map(|_| ())
     }
 }
 

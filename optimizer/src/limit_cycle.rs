@@ -1,4 +1,4 @@
-//! Phase portraits of measured walking: joint angles against their velocities over some seconds.
+//! Limit cycles of measured walking: joint angles against their velocities over some seconds.
 //!
 //! A zero-phase Butterworth low-pass (order 4 in one pass) filters the angles; velocities are their central
 //! differences. Unevenly spaced rows are first interpolated linearly on an even grid. The first and last samples have
@@ -48,7 +48,7 @@ pub struct JointRecording {
 
 /// Angle and velocity of a joint, sample by sample.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PhasePortrait {
+pub struct LimitCycle {
     /// Name of the joint.
     pub joint: String,
     /// Angle, rad.
@@ -162,27 +162,27 @@ impl JointRecording {
         ))
     }
 
-    /// The phase portrait of each joint; `cutoff_hz` is the edge of the low-pass.
+    /// The limit cycle of each joint; `cutoff_hz` is the edge of the low-pass.
     ///
     /// # Errors
     /// [`ModelError`] if the edge is out of range or the recording is too short for the filter.
-    pub fn portraits(&self, cutoff_hz: f64) -> Result<Vec<PhasePortrait>, ModelError> {
+    pub fn limit_cycles(&self, cutoff_hz: f64) -> Result<Vec<LimitCycle>, ModelError> {
         ModelError::check_range("cutoff_hz", cutoff_hz, 0.5, 0.45 * self.rate_hz)?;
         let smooth = low_pass(ORDER, cutoff_hz / (0.5 * self.rate_hz));
         let fewest = extension(&smooth) + 1;
-        let portrait = |(joint, angles): &(&'static str, Vec<f64>)| {
+        let limit_cycle = |(joint, angles): &(&'static str, Vec<f64>)| {
             if angles.len() < fewest {
                 let reason = format!("the recording has {} samples; the filter needs at least {fewest}", angles.len());
                 return Err(ModelError::Malformed { what: format!("joint {joint}"), reason });
             }
             let filtered = filter(&smooth, angles);
-            Ok(PhasePortrait {
+            Ok(LimitCycle {
                 joint: (*joint).to_owned(),
                 velocity_rad_s: filtered.windows(3).map(|near| 0.5 * (near[2] - near[0]) * self.rate_hz).collect(),
                 angle_rad: filtered[1..filtered.len() - 1].to_vec(),
             })
         };
-        self.joints.iter().map(portrait).collect()
+        self.joints.iter().map(limit_cycle).collect()
     }
 }
 

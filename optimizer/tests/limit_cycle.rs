@@ -1,8 +1,8 @@
-//! Tests of phase portraits: velocities of a known motion, columns and signs of both formats, and rejected files.
+//! Tests of limit cycles: velocities of a known motion, columns and signs of both formats, and rejected files.
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use gait_optimizer::phase_portrait::JointRecording;
+use gait_optimizer::limit_cycle::JointRecording;
 use gait_optimizer::reference::AngleUnit;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -23,10 +23,10 @@ fn knee_at(time: f64) -> f64 {
 
 #[test]
 fn velocity_matches_the_motion() {
-    let portraits = JointRecording::from_csv("walk.csv", &csv()).unwrap().portraits(6.0).unwrap();
-    let [knee] = &portraits[..] else { panic!("{portraits:?}") };
+    let limit_cycles = JointRecording::from_csv("walk.csv", &csv()).unwrap().limit_cycles(6.0).unwrap();
+    let [knee] = &limit_cycles[..] else { panic!("{limit_cycles:?}") };
     assert_eq!((knee.joint.as_str(), knee.angle_rad.len(), knee.velocity_rad_s.len()), ("knee_R", 998, 998));
-    // Away from the ends, where the filter extrapolates. The portrait begins with sample 1.
+    // Away from the ends, where the filter extrapolates. The limit cycle begins with sample 1.
     for k in 100..900 {
         let time = (k + 1) as f64 / 100.0;
         let (angle, velocity) = (knee_at(time), 0.5 * TAU * 0.9 * (TAU * 0.9 * time).cos());
@@ -87,7 +87,7 @@ fn incomplete_recordings_are_rejected_with_their_place() {
     assert_eq!(short.unwrap_err().to_string(), reason);
     let recording = JointRecording::from_csv("walk.csv", &csv()).unwrap();
     assert_eq!(recording.check_walking("walk.csv"), Ok(()));
-    assert!(recording.portraits(60.0).unwrap_err().to_string().starts_with("cutoff_hz is 60; it must be"));
+    assert!(recording.limit_cycles(60.0).unwrap_err().to_string().starts_with("cutoff_hz is 60; it must be"));
 }
 
 /// A table of joints over time with a given spacing of rows in s.
@@ -128,7 +128,7 @@ fn two_seconds_at_twenty_hertz_are_sufficient() {
     let text = table("knee_R_rad", 41, 0.05, |time| vec![knee_at(time)]);
     let recording = JointRecording::from_csv("walk.csv", &text).unwrap();
     assert_eq!(recording.check_walking("walk.csv"), Ok(()));
-    assert!(recording.portraits(6.0).is_ok());
+    assert!(recording.limit_cycles(6.0).is_ok());
     let later = table("knee_R_rad", 400, 0.05, |time| vec![knee_at(time)]);
     assert!(JointRecording::from_csv("walk.csv", &later).is_ok());
     let slower = JointRecording::from_csv("walk.csv", &table("knee_R_rad", 41, 0.0501, |time| vec![knee_at(time)]));
