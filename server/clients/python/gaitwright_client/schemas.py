@@ -10,6 +10,9 @@ from typing import Any, Literal, Optional, TypedDict, Union
 # Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was refused.
 AccessKind = Literal["view", "export", "refused"]
 
+# Who gives an answer: `subject`, the person who walks; `clinician`; `script`, a lab script.
+AnswerGiver = Literal["subject", "clinician", "script"]
+
 # Identifier of an answer to a comparison: of a preference or of an assessment.
 AnswerId = str
 
@@ -1735,13 +1738,24 @@ class LegPoints(TypedDict):
     toe: list[float]
 
 
+class LimitCycle(TypedDict):
+    """Angle and velocity of a joint, sample by sample."""
+
+    # Angle, rad.
+    angle_rad: list[float]
+    # Name of the joint.
+    joint: str
+    # Velocity, rad/s.
+    velocity_rad_s: list[float]
+
+
 class LimitCycles(TypedDict):
     """Limit cycles of a walk."""
 
     # Cut-off frequency of the zero-phase low-pass filter before central differences, Hz.
     cutoff_hz: float
     # Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
-    joints: list[PhasePortrait]
+    joints: list[LimitCycle]
     # Measurement file of the walk.
     measurement_file_id: MeasurementFileId
     # Number of the walk, 1 to 3.
@@ -2371,17 +2385,6 @@ class Optimality(TypedDict):
     complementarity: float
     # Largest entry of the Lagrangian's gradient.
     dual_infeasibility: float
-
-
-class PhasePortrait(TypedDict):
-    """Angle and velocity of a joint, sample by sample."""
-
-    # Angle, rad.
-    angle_rad: list[float]
-    # Name of the joint.
-    joint: str
-    # Velocity, rad/s.
-    velocity_rad_s: list[float]
 
 
 class PreferenceContentLabel(TypedDict):
