@@ -402,9 +402,12 @@ async fn text_is_compressed_unless_it_has_a_strong_entity_tag_or_is_a_stream() {
         assert_eq!(answer.status, StatusCode::OK, "{path}");
         answer.headers.get("content-encoding").is_some_and(|encoding| encoding == "gzip")
     };
-    for path in
-        ["/static/gaitwright.css".to_owned(), format!("/studies/{study}"), format!("/api/v1/studies/{study}/trials")]
-    {
+    for path in [
+        "/static/gaitwright.css".to_owned(),
+        "/static/gait.mjs".to_owned(),
+        format!("/studies/{study}"),
+        format!("/api/v1/studies/{study}/trials"),
+    ] {
         assert!(compressed(&path).await, "{path}");
         assert!(!service.fetch(&path).await.headers.contains_key("content-encoding"), "{path}: nobody asked for gzip");
     }

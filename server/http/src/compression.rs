@@ -13,7 +13,7 @@ type IsCompressible = fn(StatusCode, Version, &HeaderMap, &Extensions) -> bool;
 /// archives and pictures are compressed already.
 fn is_compressible(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
     let kind = headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or_default();
-    let is_text = ["text/", "application/json", "application/problem+json", "image/svg+xml"];
+    let is_text = ["text/", "application/javascript", "application/json", "application/problem+json", "image/svg+xml"];
     is_text.iter().any(|start| kind.starts_with(start))
         && !kind.starts_with("text/event-stream")
         && headers.get(header::ETAG).is_none_or(|tag| tag.as_bytes().starts_with(b"W/"))
