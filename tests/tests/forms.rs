@@ -70,7 +70,11 @@ async fn oversized_body_is_refused_as_too_large() {
     let answer = service.post_text("/api/v1/subjects", "application/json", &text).await;
     assert_eq!(answer.status, StatusCode::PAYLOAD_TOO_LARGE);
     assert_eq!(answer.json()["type"], "/problems/too-large");
-    is_page(&service.post_text("/studies/new", FORM, &text).await, StatusCode::PAYLOAD_TOO_LARGE, "1048576 bytes");
+    is_page(
+        &service.post_text("/studies/new", FORM, &text).await,
+        StatusCode::PAYLOAD_TOO_LARGE,
+        "The limit here is 1 MiB",
+    );
     service.stop().await;
 }
 

@@ -245,7 +245,7 @@ async fn preferences_are_created_read_and_retracted() {
     let mixed = json!({"trial_a": converged[0], "trial_b": foreign, "answer": "a"});
     is_problem(&service.post(&path, &mixed).await, unprocessable, "/problems/invalid-field", "of this study");
     let machine = json!({"trial_a": converged[0], "trial_b": converged[1], "answer": "a", "source": "gait_rmse"});
-    is_problem(&service.post(&path, &machine).await, unprocessable, "/problems/invalid-field", "source");
+    is_problem(&service.post(&path, &machine).await, StatusCode::BAD_REQUEST, "/problems/malformed", "source");
     assert_eq!(service.fetch(&path).await.items().as_array().unwrap().len(), before + 2);
 
     let retract = format!("/api/v1/preferences/{}/retract", row["id"].as_str().unwrap());
