@@ -38,12 +38,14 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
         (json!({"over": trial.id, "bounds": {"a6": 0.31}}), "bounds.a6"),
         (json!({"over": trial.id, "bounds": {"a6": a6}}), "bounds"),
         (json!({"over": trial.id, "bounds": {}}), "bounds"),
-        (json!({"over": trial.id, "bounds": {"a6": other}, "source": "gait_rmse"}), "source"),
     ] {
         let refused = service.post(&path, &body).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{body}: {}", refused.text);
         assert_eq!(refused.json()["field"], field, "{body}");
     }
+    let by_program = json!({"over": trial.id, "bounds": {"a6": other}, "source": "gait_rmse"});
+    let refused = service.post(&path, &by_program).await;
+    assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::BAD_REQUEST, &json!("source")));
     assert_eq!(learner_feedback(&service, study).await, before);
 
     let new = json!({"over": trial.id, "bounds": {"a6": other}, "source": "subject", "author": "S03"});
