@@ -29,13 +29,20 @@ async fn body_above_the_limit_is_answered_with_413_on_every_upload_path() {
             assert!(refused.head.to_lowercase().contains("content-type: application/problem+json"), "{}", refused.head);
             let problem = refused.json();
             assert_eq!(problem["type"], "/problems/too-large", "{problem}");
-            assert!(problem["detail"].as_str().unwrap().contains(&UPLOAD_LIMIT.to_string()), "{problem}");
+            assert!(problem["detail"].as_str().unwrap().contains("8 MiB"), "{problem}");
+        }
+        for length in [2 * UPLOAD_LIMIT + 1, 5 * UPLOAD_LIMIT] {
             let refused = post(&page, length).await.unwrap();
             assert_eq!(refused.status, 413, "{page}: {}", refused.body);
         }
         let accepted = post(&operation, UPLOAD_LIMIT).await.unwrap();
         assert_ne!(accepted.status, 413, "{operation}: {}", accepted.body);
     }
+    // A minute of six channels at 2000 Hz, as a form encodes it: three bytes for each comma and each end of a line.
+    let row = [["-0.01234"; 6].join("%2C"), "%0A".to_owned()].concat();
+    let page = of_session("emg");
+    let accepted = post(&page, "recording=".len() + 120_000 * row.len()).await.unwrap();
+    assert_ne!(accepted.status, 413, "{page}: {}", accepted.body);
     let refused = post("/api/v1/subjects", 2 << 20).await.unwrap();
     assert_eq!((refused.status, &refused.json()["type"]), (413, &"/problems/too-large".into()));
     service.stop().await;
