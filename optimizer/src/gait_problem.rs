@@ -5,7 +5,7 @@
 //! | C1 dynamics and contact | [`motion_and_contact_rows`], Hermite-Simpson of the zero dynamics in [`zero_dynamics_rows`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity_rows`], [`transitions`] |
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
-//! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], [`joint_ranges`], [`stride`] |
+//! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], `joint_ranges`, [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
 //! | C8 fibre kinematics | [`fibre_integration`] |
 //! | C9-C12 joint torques of the muscles | [`muscle_forces`] |

@@ -1,5 +1,5 @@
 //! C3 and C4: bounds of variables and of inequality rows, from the tuned bounds, the device and the settings.
-//! [`super::contact_force_bounds`] has those of contact forces.
+//! `contact_force_bounds` has those of contact forces.
 
 use super::contact_force_bounds::contact_force_bounds;
 use super::joint_ranges::joint_ranges;

@@ -21,7 +21,7 @@ pub struct Regularisation {
     pub fibre_velocity: f64,
     /// Weight of the squared bend |s_(k-1) - 2 s_k + s_(k+1)|² of activations at adjacent nodes of a domain. Without it,
     /// activations alternate from node to node (`examples/activation_smoothness.rs`). Zero in
-    /// [`GaitSettings::reference_problem`].
+    /// [`crate::settings::GaitSettings::reference_problem`].
     pub activation_bend: f64,
 }
 

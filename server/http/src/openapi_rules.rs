@@ -102,14 +102,6 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         schemas.add("NewSubject", "pseudonym", &json!({ "pattern": pseudonym }));
         let scopes: Vec<Right> = Right::ALL.into_iter().filter(|right| *right != Right::Administer).collect();
         schemas.add("NewToken", "scopes", &json!({ "items": { "enum": scopes } }));
-        let people = json!({
-            "type": "string", "enum": ["subject", "clinician", "script"], "description": "Who gives the answer."
-        });
-        schemas.insert("PersonSource", people);
-        for component in ["NewPreference", "NewAssessment", "NewSafetyReport", "Suggestion"] {
-            let one = json!({ "oneOf": [{ "$ref": format!("{SCHEMAS}PersonSource") }, { "type": "null" }] });
-            schemas.set(component, "source", one);
-        }
         let answers = json!({ "enum": [
             "first", "second", "no_difference", "cannot_tell", "unsafe_first", "unsafe_second", "unsafe_both",
         ] });

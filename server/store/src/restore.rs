@@ -2,7 +2,7 @@
 //!
 //! The backup takes the name of the record in one step, but the log and the anchor of the old record must go as well. A
 //! marker beside the record notes this, so that the next owner finishes or undoes the restore of a killed process
-//! ([`super::interrupted_restore`]).
+//! (`interrupted_restore`).
 
 use super::atomic_file::WholeFile;
 use super::interrupted_restore::{COMPANIONS, Marker, RestoreStep, finish, finish_interrupted, hash_of, mark};

@@ -118,9 +118,6 @@ OrderedAnswer = Literal[
 # Which of two gaits is better.
 PairAnswer = Literal["a", "b", "no_difference"]
 
-# Who gives the answer.
-PersonSource = Literal["subject", "clinician", "script"]
-
 # Identifier of a reference gait.
 ReferenceGaitId = str
 
@@ -2069,7 +2066,7 @@ class NewAssessment(_NewAssessmentRequired, total=False):
     replaces: Optional[AnswerId]
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
-    source: Optional[PersonSource]
+    source: Optional[AnswerGiver]
 
 
 class NewConsent(TypedDict):
@@ -2186,7 +2183,7 @@ class NewPreference(_NewPreferenceRequired, total=False):
     replaces: Optional[AnswerId]
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
-    source: Optional[PersonSource]
+    source: Optional[AnswerGiver]
 
 
 class _NewReferenceGaitRequired(TypedDict):
@@ -2235,7 +2232,7 @@ class NewSafetyReport(TypedDict, total=False):
     note: str
     # Who reports: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
-    source: Optional[PersonSource]
+    source: Optional[AnswerGiver]
 
 
 class _NewSafetyReviewRequired(TypedDict):
@@ -3315,7 +3312,7 @@ class Suggestion(_SuggestionRequired, total=False):
     note: str
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
-    source: Optional[PersonSource]
+    source: Optional[AnswerGiver]
 
 
 class SurvivedPushes(TypedDict):
