@@ -11,7 +11,7 @@ use gaitwright_store::trials::TrialState;
 /// The recommended trial: the one with the highest posterior mean among gaits without a safety report in force.
 ///
 /// # Errors
-/// As [`best_converged`].
+/// When a trial's action is not in the search space.
 pub fn best_trial(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Option<TrialId>, LearnerError> {
     Ok(ranking(snapshot, posterior)?.first().copied())
 }
