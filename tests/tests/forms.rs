@@ -227,7 +227,7 @@ async fn change_shows_its_own_comparison_and_replaces_the_answer() {
         assert_eq!(sent.status, StatusCode::SEE_OTHER, "{}", sent.text);
     }
     let first = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
-    assert_eq!(first["retraction"]["reason"], "its author gave another answer instead");
+    assert_eq!(first["retraction"]["reason"], "another answer was given instead");
     let people = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.items();
     let valid = people.as_array().unwrap().iter().filter(|row| row["author"] == "K" && row["retraction"].is_null());
     let winners: Vec<String> = valid.map(|row| row["content"]["winner"].as_str().unwrap().to_owned()).collect();

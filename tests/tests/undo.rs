@@ -159,7 +159,7 @@ async fn programs_change_and_undo_answers() {
     for (path, why) in [
         (undo, "was already undone"),
         (of(&restored), "An undo cannot be undone"),
-        (of(&first), "no longer counts: its author gave another answer instead"),
+        (of(&first), "no longer counts: another answer was given instead"),
         (of(&of_gait_rmse(&service, study).await), "Only answers of people"),
     ] {
         let refused = service.post(&path, &json!({})).await;

@@ -75,8 +75,7 @@ fn refusal(path: &str, message: &str, pairs: &Pairs) -> Error {
     } else if message.starts_with("UUID parsing failed") {
         "an identifier".to_owned()
     } else {
-        // The words of a reader of its own can be a whole refusal.
-        message.rsplit_once("it must be ").map_or(message, |(_, allowed)| allowed).trim_end_matches('.').to_owned()
+        message.to_owned()
     };
     let value = value(path).unwrap_or_default();
     Error::Invalid(Box::new(FieldError {
@@ -202,6 +201,11 @@ mod tests {
     fn errors_name_parameter_value_and_allowed_values() {
         for (query, field, message) in [
             ("number=x", "number", "The query parameter number is \"x\"; it must be a whole number of at least 0."),
+            (
+                "number=4294967296",
+                "number",
+                "The query parameter number is \"4294967296\"; it must be a whole number of at most 4294967295.",
+            ),
             ("number=1&share=half", "share", "The query parameter share is \"half\"; it must be a number."),
             ("number=1&order=up", "order", "The query parameter order is \"up\"; it must be ascending or descending."),
             (

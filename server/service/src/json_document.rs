@@ -97,7 +97,7 @@ fn unreadable(error: serde_path_to_error::Error<serde_json::Error>, bytes: &[u8]
         _ => expected(message),
     };
     // The words of a reader of its own need not complete the sentence "it must be ...".
-    let is_sentence = allowed == message || message.starts_with("solver.");
+    let is_sentence = allowed == message;
     let message = match (missing, twice) {
         (Some(_), _) => format!("The field {field} is missing{place}."),
         (_, Some(_)) => format!("The field {field} occurs twice{place}."),
@@ -357,6 +357,12 @@ mod tests {
         assert_eq!(read::<GaitSettings>(&written).unwrap(), settings);
         let list: Vec<Option<f64>> = read(b"[1, null, 2.5]").unwrap();
         assert_eq!(list, [Some(1.0), None, Some(2.5)]);
+    }
+
+    #[test]
+    fn integer_that_is_too_large_is_told_the_largest_value() {
+        let refused = super::read::<Vec<u32>>(b"[4294967296]").unwrap_err().to_string();
+        assert!(refused.contains("it must be a whole number of at most 4294967295"), "{refused}");
     }
 
     #[test]

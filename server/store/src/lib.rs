@@ -210,7 +210,7 @@ impl Store {
             .busy_timeout(Duration::from_secs(10))
             // Each table has its own statements for seals.
             .statement_cache_capacity(400)
-            // The schema is one long statement, which a slow disk would print as a warning.
+            // On a slow disk, the whole schema would be logged as a slow statement.
             .log_slow_statements(log::LevelFilter::Debug, Duration::from_secs(1));
         // Few rows ahead, because the verification reads rows that contain whole measurement files.
         let one = options.clone().row_buffer_size(quarantine::ROWS_AHEAD);

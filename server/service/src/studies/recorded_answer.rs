@@ -10,7 +10,7 @@ use gaitwright_store::{AnswerId, Connection, Instant, StoreResult, StudyId, Tria
 use serde_json::json;
 
 /// The reason in the record of an answer that another one replaced.
-const CHANGED: &str = "its author gave another answer instead";
+const CHANGED: &str = "another answer was given instead";
 
 /// An answer to a comparison.
 #[derive(Debug, Clone, PartialEq)]

@@ -30,8 +30,8 @@ pub struct StudyExtension {
 /// [`Error::Invalid`] if the number of trials would not increase, [`Error::Conflict`] if it cannot, [`Error::NotFound`].
 pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &StudyExtension) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
-    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), 2, MOST_TRIALS)?;
     let least = i64::from(study.plan.number_of_trials) + 1;
+    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least.min(MOST_TRIALS), MOST_TRIALS)?;
     if least > MOST_TRIALS {
         return Err(Error::conflict(format!(
             "The study has {MOST_TRIALS} trials already, which is the largest number."

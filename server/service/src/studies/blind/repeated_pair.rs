@@ -1,4 +1,4 @@
-//! Chooses whether a rater is shown an earlier pair again, to measure the agreement of a rater with himself or herself.
+//! Chooses whether a rater is shown an earlier pair again, to measure how consistently the rater answers.
 
 use gaitwright_store::TrialId;
 use gaitwright_store::blind_pairs::{BlindPair, BlindPairKind, OrderedAnswer};
