@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::action::ActionIndex;
 use crate::error::Result;
 use crate::feedback::{Feedback, FeedbackLog};
-use crate::learner::Learner;
 use crate::search_space::SearchSpace;
 use crate::settings::{LearnerSettings, Partner};
+use crate::utility_inference::Learner;
 
 /// The reason for a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

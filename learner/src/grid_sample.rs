@@ -76,9 +76,9 @@ mod tests {
     use super::*;
     use crate::action::ActionIndex;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::learner::posterior;
     use crate::search_space::Dimension;
     use crate::settings::{LearnerSettings, Method};
+    use crate::utility_inference::posterior;
 
     #[test]
     fn samples_have_the_posterior_moments() {

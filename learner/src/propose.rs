@@ -7,11 +7,11 @@ use crate::action::ActionIndex;
 use crate::error::{LearnerError, Result};
 use crate::excluded::{ExcludedActions, ForbiddenActions};
 use crate::feedback::FeedbackLog;
-use crate::learner::Learner;
 use crate::posterior::Posterior;
 use crate::random::Random;
 use crate::search_space::SearchSpace;
 use crate::settings::{LearnerSettings, Method, Start};
+use crate::utility_inference::Learner;
 
 /// The rule by which an action was chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -243,7 +243,7 @@ mod tests {
                 log.visited.push(proposal.action);
             }
             assert!(matches!(propose(&space, &log, &[], &settings, 5), Err(LearnerError::Exhausted { .. })));
-            let best = crate::learner::posterior(&space, &log, &settings).unwrap().best().unwrap();
+            let best = crate::utility_inference::posterior(&space, &log, &settings).unwrap().best().unwrap();
             assert_eq!(space.levels(best), [1, 2, 0], "{method:?}");
         }
     }
@@ -277,7 +277,7 @@ mod tests {
                     log.feedback.push(Feedback::Label { action, category: usize::from(converges(action)) });
                     log.visited.push(action);
                 }
-                let posterior = crate::learner::posterior(&space, &log, &settings).unwrap();
+                let posterior = crate::utility_inference::posterior(&space, &log, &settings).unwrap();
                 let avoidance = Avoidance::of(&posterior).unwrap();
                 let outside = (0..space.len()).map(ActionIndex).filter(|&a| avoidance.allows(a)).count();
                 assert!((1..36).contains(&outside), "{outside} {settings:?}");

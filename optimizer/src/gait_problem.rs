@@ -6,15 +6,16 @@
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity_rows`], [`transitions`] |
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], `joint_ranges`, [`stride`] |
-//! | C5-C7 muscle force equilibrium | [`muscle_forces`] |
+//! | C5-C7 muscle force equilibrium | [`fibre_and_tendon_force_rows`] |
 //! | C8 fibre kinematics | [`fibre_integration`] |
-//! | C9-C12 joint torques of the muscles | [`muscle_forces`] |
+//! | C9-C12 joint torques of the muscles | [`fibre_and_tendon_force_rows`] |
 
 pub(crate) mod active_constraint;
 mod contact_force_bounds;
 pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;
+pub mod fibre_and_tendon_force_rows;
 pub mod fibre_integration;
 pub mod foot_clearance;
 mod gait_of_variables;
@@ -26,7 +27,6 @@ pub mod layout;
 pub mod margins;
 pub mod mesh_transfer;
 pub mod motion_and_contact_rows;
-pub mod muscle_forces;
 pub mod objective;
 mod problem_definition;
 pub mod program_data;

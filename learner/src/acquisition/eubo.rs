@@ -157,10 +157,10 @@ mod tests {
     use super::*;
     use crate::excluded::ExcludedActions;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::learner::posterior;
     use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::{Labels, LearnerSettings, Method};
     use crate::special_functions;
+    use crate::utility_inference::posterior;
 
     #[test]
     fn pruned_search_finds_the_exact_maximiser() {

@@ -153,9 +153,9 @@ mod tests {
 
     use crate::excluded::ExcludedActions;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::learner::posterior;
     use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::Method;
+    use crate::utility_inference::posterior;
 
     /// Mutual information of all feedback with both processes, by its definition and plain Monte Carlo.
     fn by_definition(settings: &LearnerSettings, utility: &JointMoments, feasibility: (f64, f64)) -> f64 {

@@ -84,7 +84,7 @@ fn approximations_agree_with_long_sampling() {
     let dimensions =
         (0..3).map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0], lengthscale: 1.0 }).collect();
     let space = SearchSpace::new(dimensions).unwrap();
-    let kernel = crate::learner::kernel(&space, &LearnerSettings::default());
+    let kernel = crate::utility_inference::kernel(&space, &LearnerSettings::default());
     println!("data                        error of mean (EP, Laplace)   sd (sampled, EP, Laplace)");
     // Laplace's approximation gets wider bounds, because its error is larger (docs/benchmarks/learner.md).
     for (name, noise, no_difference, bounds) in [

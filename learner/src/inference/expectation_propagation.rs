@@ -80,9 +80,9 @@ mod tests {
     use super::*;
     use crate::action::ActionIndex;
     use crate::feedback::{Feedback, FeedbackLog};
-    use crate::learner::posterior;
     use crate::search_space::{Dimension, SearchSpace};
     use crate::settings::{LearnerSettings, Method};
+    use crate::utility_inference::posterior;
 
     #[test]
     fn moments_match_quadrature() {

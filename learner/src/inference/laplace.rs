@@ -101,7 +101,7 @@ mod tests {
             .map(|d| Dimension { name: d.to_string(), values: vec![0.0, 1.0, 2.0, 3.0], lengthscale: 1.0 })
             .collect();
         let space = SearchSpace::new(dimensions).unwrap();
-        let kernel = crate::learner::kernel(&space, &LearnerSettings::default());
+        let kernel = crate::utility_inference::kernel(&space, &LearnerSettings::default());
         for (link, noise, seed) in [(Link::Logistic, 0.02, 1), (Link::Probit, 0.02, 2), (Link::Logistic, 0.5, 3)] {
             let mut random = Random::new(seed, 0);
             let mut observations = Vec::new();

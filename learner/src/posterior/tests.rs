@@ -3,11 +3,11 @@
 use crate::action::ActionIndex;
 use crate::error::LearnerError;
 use crate::feedback::{Feedback, FeedbackLog};
-use crate::learner::posterior;
 use crate::linalg::dot;
 use crate::random::Random;
 use crate::search_space::{Dimension, SearchSpace};
 use crate::settings::{Labels, LearnerSettings, Method};
+use crate::utility_inference::posterior;
 
 fn space() -> SearchSpace {
     let dimensions = [2, 3, 4]

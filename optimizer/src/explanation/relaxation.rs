@@ -1,10 +1,6 @@
 //! Relaxations: which bound, or which bounds together, must give way for a gait, and by how much at least.
 
-use super::bound::{Level, least_move, loosened, step};
-use super::conflict::BoundSet;
-use super::given_bound::BoundValue;
-use super::search::Search;
-use super::solves::{SearchEnd, Starts};
+use super::bound::step;
 use crate::solve::WarmStart;
 use crate::tuned_bounds::TunedBounds;
 use serde::{Deserialize, Serialize};
@@ -86,60 +82,6 @@ impl Relaxation {
 impl JointRelaxation {
     pub(super) fn size(&self) -> f64 {
         size(self.bounds.iter().map(|one| (one.bound.as_str(), one.from, one.to)))
-    }
-}
-
-impl Search<'_> {
-    /// The smallest relaxation of the bounds of a set that gives a gait, if there is one.
-    pub(super) fn level(&mut self, set: BoundSet) -> Result<Option<Level>, SearchEnd> {
-        let before = self.solves.count;
-        if self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Usual)?, Starts::All)? {
-            return Ok(Some(Level::Usual));
-        }
-        // Initial guesses that failed there also fail with the loosest values, which are further from walking.
-        let starts = if self.solves.count > before { Starts::Nearest } else { Starts::All };
-        let loosest = self.solves.is_met(&loosened(&self.problem.bounds, set, Level::Loosest)?, starts)?;
-        Ok(loosest.then_some(Level::Loosest))
-    }
-
-    /// The smallest joint relaxation of the bounds of a set.
-    pub(super) fn relaxed(&mut self, set: BoundSet) -> Result<JointRelaxation, SearchEnd> {
-        let given = self.problem.bounds;
-        let before = self.solves.count;
-        let (mut to, mut warm_start) = (None, None);
-        let (not_with, searches) = match self.level(set)? {
-            Some(level) => {
-                let loose = loosened(&given, set, level)?;
-                warm_start = self.solves.gait(&loose)?;
-                // Tighter bounds than those without a gait need no solve.
-                let tight = if level == Level::Usual { given } else { loosened(&given, set, Level::Usual)? };
-                let solves = &mut self.solves;
-                let (nearest, none) = least_move(&tight, &loose, |bounds| {
-                    let gait = solves.solve(bounds, Starts::All)?;
-                    let found = gait.is_some();
-                    warm_start = gait.or(warm_start.take());
-                    Ok::<_, SearchEnd>(found)
-                })?;
-                to = Some(nearest.to_array());
-                (none, self.solves.unmet(&none).into_iter().filter(|_| none != given).collect())
-            }
-            None => (loosened(&given, set, Level::Loosest)?, self.searched(set)?),
-        };
-        let (starts, undecided) = (searches.iter().map(|s| s.starts).sum(), searches.iter().any(|s| s.undecided));
-        let of_bound = |one: BoundValue, bound: usize| RelaxedBound {
-            bound: one.bound,
-            meaning: one.meaning,
-            from: one.value,
-            to: to.map(|to| to[bound]),
-            not_with: not_with.to_array()[bound],
-        };
-        Ok(JointRelaxation {
-            bounds: self.given(set).into_iter().zip(set.bounds()).map(|(one, bound)| of_bound(one, bound)).collect(),
-            undecided,
-            solves: self.solves.count - before,
-            starts,
-            warm_start,
-        })
     }
 }
 

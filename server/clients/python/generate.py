@@ -9,7 +9,7 @@ import pathlib
 import sys
 
 from generator.operations import operation_modules
-from generator.schemas import schema_module
+from generator.object_types import schema_module
 
 HERE = pathlib.Path(__file__).resolve().parent
 DESCRIPTION = HERE.parent.parent / "openapi.json"

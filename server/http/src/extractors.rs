@@ -57,8 +57,9 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Form<T> {
     type Rejection = super::page_error::PageError;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Self::Rejection> {
-        let axum::Form(value) =
-            axum::Form::<T>::from_request(request, state).await.map_err(|e| unreadable(e.status(), &e.body_text()))?;
-        Ok(Self(value))
+        let axum::extract::RawForm(bytes) = axum::extract::RawForm::from_request(request, state)
+            .await
+            .map_err(|e| unreadable(e.status(), &e.body_text()))?;
+        Ok(Self(query_string::read_form(&bytes)?))
     }
 }

@@ -31,6 +31,7 @@ pub mod openapi;
 mod openapi_binary;
 mod openapi_dependent_rules;
 mod openapi_descriptions;
+mod openapi_nulls;
 mod openapi_rules;
 mod openapi_schemas;
 mod openapi_settings;

@@ -6,7 +6,7 @@
 
 use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
 use super::problem_details::{PROBLEM_JSON, Problem};
-use super::{api, openapi_dependent_rules, openapi_rules};
+use super::{api, openapi_dependent_rules, openapi_nulls, openapi_rules};
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityScheme};
@@ -84,6 +84,7 @@ fn with_missed_rules() -> Result<(Value, Vec<String>), serde_json::Error> {
     refer_to_entries(&mut value);
     let mut value = name_pages(value);
     let missed = openapi_rules::state(&mut value);
+    openapi_nulls::require_in_responses(&mut value);
     let schemas = value["components"]["schemas"].clone();
     for (_, item) in value["paths"].as_object_mut().into_iter().flatten() {
         for (method, operation) in item.as_object_mut().into_iter().flatten() {

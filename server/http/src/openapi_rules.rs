@@ -18,7 +18,7 @@ use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Sub
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::LARGEST_SEED;
-use gaitwright_store::trial_query::SORTS;
+use gaitwright_store::trial_list::SORTS;
 use serde_json::{Map, Value, json};
 
 /// Control characters other than tab and line breaks, and characters that change the direction of text.

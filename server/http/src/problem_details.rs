@@ -33,15 +33,18 @@ pub(super) struct Problem {
     pub(super) detail: String,
     /// Name of the field that was refused.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = String, required = false)]
     pub(super) field: Option<String>,
     /// Value that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) value: Option<Value>,
     /// Values that are accepted.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = String, required = false)]
     pub(super) allowed: Option<String>,
     /// Identifier of the request, as in the `X-Request-Id` header and the log.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = String, required = false)]
     pub(super) request_id: Option<String>,
 }
 

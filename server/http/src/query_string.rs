@@ -1,4 +1,4 @@
-//! Reads query strings strictly, with errors that name parameter, value and what is allowed.
+//! Reads query strings and submitted forms strictly, with errors that name parameter, value and what is allowed.
 
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::json_document;
@@ -19,15 +19,23 @@ pub(crate) fn pairs(query: &str) -> Result<Pairs, Error> {
 
 /// The message about a parameter that occurs twice.
 pub(crate) fn occurs_twice(name: &str) -> String {
-    format!("The query parameter {name} occurs twice.")
+    repeated("query parameter", name)
+}
+
+fn repeated(what: &str, name: &str) -> String {
+    format!("The {what} {name} occurs twice.")
 }
 
 /// The refusal of a parameter that is not among the known ones. No value of it is allowed.
 pub(crate) fn unknown<'a>(name: &str, value: Option<&str>, known: impl IntoIterator<Item = &'a str>) -> Error {
+    not_known("query parameter", name, value, known)
+}
+
+fn not_known<'a>(what: &str, name: &str, value: Option<&str>, known: impl IntoIterator<Item = &'a str>) -> Error {
     let known: Vec<&str> = known.into_iter().filter(|name| !name.is_empty()).collect();
     let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
     Error::Unreadable(Box::new(FieldError {
-        message: format!("The query parameter {name} is unknown. Known parameters: {known}."),
+        message: format!("The {what} {name} is unknown. Known {what}s: {known}."),
         field: name.to_owned(),
         value: value.map(Into::into),
         allowed: None,
@@ -40,15 +48,30 @@ pub(crate) fn unknown<'a>(name: &str, value: Option<&str>, known: impl IntoItera
 /// [`Error::Invalid`] naming parameter, value and what is allowed; [`Error::Unreadable`] naming a parameter that is
 /// missing, unknown or occurs twice.
 pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs) -> Result<T, Error> {
+    read_from(pairs, "query parameter")
+}
+
+/// Reads the fields of a submitted form.
+///
+/// # Errors
+/// As [`read`], and [`Error::Malformed`].
+pub(crate) fn read_form<T: DeserializeOwned>(body: &[u8]) -> Result<T, Error> {
+    let pairs: Pairs = serde_urlencoded::from_bytes(body)
+        .map_err(|e| Error::Malformed(format!("The submitted form cannot be read: {e}.")))?;
+    read_from(&pairs, "form field")
+}
+
+/// Reads named values. `what` is the word for one of them.
+fn read_from<T: DeserializeOwned>(pairs: &Pairs, what: &str) -> Result<T, Error> {
     let values = pairs.iter().map(|(name, value)| (name.as_str(), Text(value)));
     let reader = MapDeserializer::<_, Refused>::new(values);
     serde_path_to_error::deserialize(reader).map_err(|error| {
         let path = error.path().to_string();
-        refusal(&path, &error.into_inner().to_string(), pairs)
+        refusal(&path, &error.into_inner().to_string(), pairs, what)
     })
 }
 
-fn refusal(path: &str, message: &str, pairs: &Pairs) -> Error {
+fn refusal(path: &str, message: &str, pairs: &Pairs, what: &str) -> Error {
     let named = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').next());
     let value = |field: &str| pairs.iter().find(|(name, _)| name == field).map(|(_, value)| value.as_str());
     let unreadable = |field: &str, message: String, allowed: &str| {
@@ -58,15 +81,15 @@ fn refusal(path: &str, message: &str, pairs: &Pairs) -> Error {
     // The value comes before what is expected, and may hold any words.
     let expected = || json_document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]));
     if let Some(field) = named("missing field `") {
-        return unreadable(field, format!("The query parameter {field} is missing."), "present");
+        return unreadable(field, format!("The {what} {field} is missing."), "present");
     }
     if let Some(field) = named("duplicate field `") {
-        return unreadable(field, occurs_twice(field), "present only once");
+        return unreadable(field, repeated(what, field), "present only once");
     }
     if let Some(field) = named("unknown field `") {
         let known = if message.ends_with("there are no fields") { String::new() } else { expected() };
         let known = known.trim_start_matches("one of ").replace(" or ", ", ");
-        return unknown(field, value(field), known.split(", "));
+        return not_known(what, field, value(field), known.split(", "));
     }
     let allowed = if message.starts_with("invalid value: integer") {
         json_document::expected(message)
@@ -79,10 +102,7 @@ fn refusal(path: &str, message: &str, pairs: &Pairs) -> Error {
     };
     let value = value(path).unwrap_or_default();
     Error::Invalid(Box::new(FieldError {
-        message: format!(
-            "The query parameter {path} is {}; it must be {allowed}.",
-            json_document::shortened(&value.into())
-        ),
+        message: format!("The {what} {path} is {}; it must be {allowed}.", json_document::shortened(&value.into())),
         field: path.to_owned(),
         value: Some(value.into()),
         allowed: Some(allowed),

@@ -31,6 +31,7 @@ mod prune;
 mod reference;
 mod reference_comparison;
 mod reproduce;
+mod resumed_study;
 mod serve;
 mod settings;
 mod simulate;

@@ -7,6 +7,7 @@ use super::flag_numbers::{seed, trials, workers};
 use super::multi_start_flags::MultiStartFlags;
 use super::output::{data, tell};
 use super::problem_files::ProblemFiles;
+use super::resumed_study;
 use super::settings::{AnchoredFlags, Settings};
 use super::subject_flags::{SubjectFlags, Switch};
 use super::unattended_study::{self, Lines, action_line};
@@ -84,7 +85,7 @@ impl TuneCommand {
             warm_start_from: self.warm_start_from,
             ..NewStudy::of(subject.id)
         };
-        let study = Box::pin(unattended_study::study(&store, new)).await?;
+        let study = Box::pin(resumed_study::resumed_or_new(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
         let ran = Box::pin(unattended_study::run_and_certify(&mut store, &study, workers, lines)).await;
         store.close().await;

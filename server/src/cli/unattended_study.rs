@@ -8,13 +8,12 @@ use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::certified_best::{self, BestCertification};
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::summary;
 use gaitwright_service::workers::{GaitSolver, InProcess};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Store, commit, studies, trials as trial_rows};
+use gaitwright_store::{Store, studies, trials as trial_rows};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
 use std::sync::Arc;
@@ -48,24 +47,6 @@ pub(super) fn failure(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Op
     let last = trials.iter().rev().find(failed)?;
     let count = trials.iter().filter(failed).count();
     Some(format!("{count} of {} trials failed; the last one was trial {}: {}", trials.len(), last.number, last.message))
-}
-
-/// The unfinished study with the same settings, or a new one.
-pub(super) async fn study(store: &Store, new: NewStudy) -> Result<Study, Error> {
-    let mut writer = store.write().await?;
-    let wanted = study_plan::checked(&mut writer, new.clone()).await?;
-    let unfinished =
-        studies::active(&mut writer).await?.into_iter().find(|study| study.plan.has_same_trials_as(&wanted));
-    let study = if let Some(study) = unfinished {
-        let done = trial_rows::counts(&mut writer, study.id).await?;
-        let ended = done.total - done.open;
-        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.number_of_trials));
-        study
-    } else {
-        study_plan::create(&mut writer, &Actor::terminal(), new).await?
-    };
-    commit(writer).await?;
-    Ok(study)
 }
 
 /// Runs a study until it ends or a person stops it.

@@ -73,7 +73,7 @@ pub mod subjects;
 mod time;
 pub mod tokens;
 pub mod totals;
-pub mod trial_query;
+pub mod trial_list;
 pub mod trials;
 pub mod users;
 mod verified_copy;

@@ -201,7 +201,9 @@ WalkCondition = Literal["normal", "gait_a", "gait_b"]
 WarmStartFrom = Literal["incumbent", "root"]
 
 
-class _AccessRowRequired(TypedDict):
+class AccessRow(TypedDict):
+    """Row of the access log."""
+
     # Who made the request.
     actor: str
     # Client address; empty for the command line.
@@ -222,17 +224,12 @@ class _AccessRowRequired(TypedDict):
     seq: int
     # HTTP status; 0 for the command line.
     status: int
-    # Number of identical accesses within a minute.
-    times: int
-
-
-class AccessRow(_AccessRowRequired, total=False):
-    """Row of the access log."""
-
     # Study of the request, if any.
     study_id: Optional[StudyId]
     # Subject of the request, if any.
     subject_id: Optional[SubjectId]
+    # Number of identical accesses within a minute.
+    times: int
 
 
 class ActiveConstraint(TypedDict):
@@ -280,17 +277,28 @@ class AskRequest(TypedDict, total=False):
     script: Optional[str]
 
 
-class _AssessmentRequired(TypedDict):
+class Assessment(TypedDict):
+    """A recorded assessment."""
+
     # The answer.
     answer: AssessmentAnswer
     # Name or pseudonym of the person who answered.
     author: str
     # Time of recording.
     created_at: Instant
+    # Preference that was derived from it. Null if there is none.
+    feedback_id: Optional[FeedbackId]
     # Identifier.
     id: AssessmentId
     # Free text.
     note: str
+    # Identifier of the preference or assessment that it replaced. Null if it replaced none.
+    replaces: Optional[AnswerId]
+    # Identifier of the assessment that it brings back, because the answer that had replaced that one was undone. Null
+    # otherwise.
+    restores: Optional[AssessmentId]
+    # Retraction. Null if the assessment was not retracted.
+    retraction: Optional[Retraction]
     # Who answered.
     source: Source
     # Identifier of the study.
@@ -301,38 +309,21 @@ class _AssessmentRequired(TypedDict):
     trial_b: TrialId
 
 
-class Assessment(_AssessmentRequired, total=False):
-    """A recorded assessment."""
+class AttemptResult(TypedDict):
+    """Result of an attempt."""
 
-    # Preference that was derived from it. Null if there is none.
-    feedback_id: Optional[FeedbackId]
-    # Identifier of the preference or assessment that it replaced. Null if it replaced none.
-    replaces: Optional[AnswerId]
-    # Identifier of the assessment that it brings back, because the answer that had replaced that one was undone. Null
-    # otherwise.
-    restores: Optional[AssessmentId]
-    # Retraction. Null if the assessment was not retracted.
-    retraction: Optional[Retraction]
-
-
-class _AttemptResultRequired(TypedDict):
     # Number of the attempt, from 1.
     attempt: int
     # Time of arrival.
     received_at: Instant
+    # Numerical results of the solve, without those that are not finite.
+    report: Optional[SolveReport]
     # How the solve ended.
     status: SolveStatus
     # Whether it became the result of the trial. Otherwise it arrived too late and is kept as evidence.
     used: bool
     # Name of the worker.
     worker: str
-
-
-class AttemptResult(_AttemptResultRequired, total=False):
-    """Result of an attempt."""
-
-    # Numerical results of the solve, without those that are not finite.
-    report: Optional[SolveReport]
 
 
 AuditDetail = TypedDict(
@@ -658,47 +649,41 @@ class Bounds(TypedDict):
     a8: float
 
 
-class _CertificateRequired(TypedDict):
-    # Every quantity with its worst value and its limit.
-    checks: list[CertificateCheck]
-    # Reasons if it failed; otherwise empty.
-    failures: list[str]
-    # Version of this layout and of its checks.
-    format_version: int
-    # Whether every checked value is within its limit, the walker does not fall, and the gait is stable.
-    passed: bool
-
-
-class Certificate(_CertificateRequired, total=False):
+class Certificate(TypedDict):
     """A certificate: the result of checking a gait independently of the optimiser."""
 
     # The gait that was checked; null if it is malformed.
     certified: Optional[CertifiedGait]
+    # Every quantity with its worst value and its limit.
+    checks: list[CertificateCheck]
+    # Reasons if it failed; otherwise empty.
+    failures: list[str]
     # How the simulation ended early; null if it did not.
     fall: Optional[str]
+    # Version of this layout and of its checks.
+    format_version: int
     # The stride-to-stride map with a free hip velocity (zero dynamics). Null if the simulation ended early, or if the
     # map could not be computed.
     free_hip_return_map: Optional[ReturnMap]
+    # Whether every checked value is within its limit, the walker does not fall, and the gait is stable.
+    passed: bool
     # Largest pushes from which the walker recovers. Null if the gait is not stable.
     pushes: Optional[Pushes]
     # The stride-to-stride map. Null if the simulation ended early.
     return_map: Optional[ReturnMap]
 
 
-class _CertificateCheckRequired(TypedDict):
+class CertificateCheck(TypedDict):
+    """The worst value of a quantity."""
+
+    # Largest allowed value. Null if the value is only reported.
+    limit: Optional[float]
     # What was measured.
     name: str
     # Domain and time of the worst value.
     place: str
     # Unit of the value and the limit; empty if dimensionless.
     unit: str
-
-
-class CertificateCheck(_CertificateCheckRequired, total=False):
-    """The worst value of a quantity."""
-
-    # Largest allowed value. Null if the value is only reported.
-    limit: Optional[float]
     # Worst value; null if it could not be determined, which counts as failed.
     value: Optional[float]
 
@@ -763,9 +748,9 @@ class Conflict(_ConflictRequired, total=False):
 
     # Requirements for natural walking that take part in a conflict between fixed constraints, in words; absent if there
     # are none.
-    naturalness_terms: Optional[list[str]]
+    naturalness_terms: list[str]
     # Bounds of other conflicts that were relaxed when this conflict was found.
-    without: Optional[list[str]]
+    without: list[str]
 
 
 class Consent(TypedDict):
@@ -801,11 +786,15 @@ class ContactRowName(TypedDict):
     side: Leg
 
 
-class _ControlledDomainRequired(TypedDict):
+class ControlledDomain(TypedDict):
+    """A domain, as a controller tracks it."""
+
     # Planned duration, s.
     duration_s: float
     # The event that ends the domain.
     ends: str
+    # Set point of the hip velocity, m/s. Null in underactuated domains, in which it is free.
+    hip_velocity_m_s: Optional[float]
     # Name: DS2 and DS3 for double support, SS2 and SS1 for single support on the flat foot and on the toe, with _R or
     # _L for the stance leg.
     name: str
@@ -820,13 +809,6 @@ class _ControlledDomainRequired(TypedDict):
     phase_start_m: float
     # The stance leg; in double support, the leg that becomes the stance leg.
     stance: Leg
-
-
-class ControlledDomain(_ControlledDomainRequired, total=False):
-    """A domain, as a controller tracks it."""
-
-    # Set point of the hip velocity, m/s. Null in underactuated domains, in which it is free.
-    hip_velocity_m_s: Optional[float]
 
 
 class _ControllerFileRequired(TypedDict):
@@ -900,7 +882,9 @@ class Correction(TypedDict):
     seq: int
 
 
-class _PreferenceRequired(TypedDict):
+class Preference(TypedDict):
+    """A preference or a suggestion of a study."""
+
     # Name or pseudonym of the person who answered.
     author: str
     # Whether it comes from a rater's blind comparison.
@@ -915,17 +899,6 @@ class _PreferenceRequired(TypedDict):
     id: FeedbackId
     # Free text.
     note: str
-    # Sequence number.
-    seq: int
-    # Who or what it came from.
-    source: Source
-    # Identifier of the study.
-    study_id: StudyId
-
-
-class Preference(_PreferenceRequired, total=False):
-    """A preference or a suggestion of a study."""
-
     # Identifier of the preference or assessment that it replaced. Null if it replaced none.
     replaces: Optional[AnswerId]
     # Identifier of the preference that it brings back, because the answer that had replaced that one was undone. Null
@@ -933,6 +906,12 @@ class Preference(_PreferenceRequired, total=False):
     restores: Optional[FeedbackId]
     # Retraction. Null if it was not retracted.
     retraction: Optional[Retraction]
+    # Sequence number.
+    seq: int
+    # Who or what it came from.
+    source: Source
+    # Identifier of the study.
+    study_id: StudyId
 
 
 class CreatedPreference(Preference):
@@ -951,26 +930,23 @@ class CreatedRaterInvitation(TypedDict):
     path: str
 
 
-class _TokenRequired(TypedDict):
+class Token(TypedDict):
+    """Token of a program, without its secret."""
+
     # Time of creation.
     created_at: Instant
     # Who created it. The token is revoked when this user is disabled or is no longer an administrator.
     created_by: str
+    # Time of expiry. Null if it does not expire.
+    expires_at: Optional[Instant]
     # Identifier.
     id: TokenId
     # Unique name that states its purpose.
     name: str
-    # Rights of the token.
-    scopes: list[Right]
-
-
-class Token(_TokenRequired, total=False):
-    """Token of a program, without its secret."""
-
-    # Time of expiry. Null if it does not expire.
-    expires_at: Optional[Instant]
     # Time of revocation. Null if it is not revoked.
     revoked_at: Optional[Instant]
+    # Rights of the token.
+    scopes: list[Right]
 
 
 class CreatedToken(Token):
@@ -980,16 +956,13 @@ class CreatedToken(Token):
     secret: str
 
 
-class _CurrentUserRequired(TypedDict):
+class CurrentUser(TypedDict):
+    """Caller of the request."""
+
     # Name of the user or the token.
     name: str
     # Rights of the caller.
     rights: list[Right]
-
-
-class CurrentUser(_CurrentUserRequired, total=False):
-    """Caller of the request."""
-
     # Role of the user. Null for tokens.
     role: Optional[Role]
 
@@ -1087,7 +1060,11 @@ class Dimension(TypedDict):
     values: list[float]
 
 
-class _DomainTrajectoryRequired(TypedDict):
+class DomainTrajectory(TypedDict):
+    """The trajectory in one domain, at equidistant nodes. Lists *at each node* have one row for each entry of
+    `time_s`.
+    """
+
     # For each output, the 6 Bezier coefficients of its curve over the phase, rad.
     bezier: list[list[float]]
     # Ground reaction forces at each node, in the order of `contact_rows`, N.
@@ -1096,6 +1073,10 @@ class _DomainTrajectoryRequired(TypedDict):
     contact_rows: list[ContactRowName]
     # Duration, s.
     duration_s: float
+    # Impulse of the impact at the start of the domain, in the order of `contact_rows`, N s. Null without an impact.
+    impulse: Optional[list[float]]
+    # States of the muscles. Null without muscles.
+    muscles: Optional[MuscleTrajectory]
     # Name: DS2 and DS3 for double support, SS2 and SS1 for single support on the flat foot and on the toe, with _R or
     # _L for the stance leg.
     name: str
@@ -1116,17 +1097,6 @@ class _DomainTrajectoryRequired(TypedDict):
     time_s: list[float]
     # Joint torques at each node: 6 numbers, hip_L, knee_L, ankle_L, hip_R, knee_R and ankle_R, N m.
     u: list[list[float]]
-
-
-class DomainTrajectory(_DomainTrajectoryRequired, total=False):
-    """The trajectory in one domain, at equidistant nodes. Lists *at each node* have one row for each entry of
-    `time_s`.
-    """
-
-    # Impulse of the impact at the start of the domain, in the order of `contact_rows`, N s. Null without an impact.
-    impulse: Optional[list[float]]
-    # States of the muscles. Null without muscles.
-    muscles: Optional[MuscleTrajectory]
 
 
 class EmgProcessing(TypedDict, total=False):
@@ -1178,7 +1148,7 @@ class EmgRmse(_EmgRmseRequired, total=False):
     """EMG RMSE of a walk, in total and for each channel, relative to the peak of the walk without the device."""
 
     # Reasons to doubt the comparison. Absent if there are none.
-    warnings: Optional[list[str]]
+    warnings: list[str]
 
 
 class EmgSettings(TypedDict, total=False):
@@ -1203,7 +1173,9 @@ class EmgView(TypedDict):
     result: EmgResult
 
 
-class _ExecutionReportRequired(TypedDict):
+class ExecutionReport(TypedDict):
+    """Simulated walks with a gait, by a model other than the optimiser's."""
+
     # Range from which the body masses of disturbed simulated walks are drawn, kg: ±5 %, limited to the range of the
     # model.
     body_mass_kg: list[float]
@@ -1213,6 +1185,8 @@ class _ExecutionReportRequired(TypedDict):
     gait_sha256: str
     # Randomly disturbed simulated walks, for each kind of ground.
     grounds: list[SimulatedWalksOnGround]
+    # Largest pushes survived. Null if the walker does not complete the undisturbed walk.
+    pushes: Optional[SurvivedPushes]
     # Seed of the disturbances.
     seed: int
     # Strides of a complete simulated walk.
@@ -1222,13 +1196,6 @@ class _ExecutionReportRequired(TypedDict):
     strides_by_yield: list[StridesOnYield]
     # Completed strides without any disturbance.
     undisturbed_strides: int
-
-
-class ExecutionReport(_ExecutionReportRequired, total=False):
-    """Simulated walks with a gait, by a model other than the optimiser's."""
-
-    # Largest pushes survived. Null if the walker does not complete the undisturbed walk.
-    pushes: Optional[SurvivedPushes]
 
 
 class FloquetMultiplier(TypedDict):
@@ -1460,24 +1427,21 @@ class Health(TypedDict):
     version: str
 
 
-class _ImportRequired(TypedDict):
+class Import(TypedDict):
+    """Import of a study."""
+
     # Who imported it.
     actor: str
     # SHA-256 of the archive.
     file_sha256: str
     # Time of the import.
     imported_at: Instant
+    # Public key of the signer. Null for an unsigned archive.
+    signed_by: Optional[str]
     # Whether the import required a signature by that key.
     trusted: bool
     # Number of trials whose Gait RMSE could not be checked, because the archive does not have their gaits.
     unchecked_rmse: int
-
-
-class Import(_ImportRequired, total=False):
-    """Import of a study."""
-
-    # Public key of the signer. Null for an unsigned archive.
-    signed_by: Optional[str]
 
 
 class Iteration(TypedDict):
@@ -1503,18 +1467,13 @@ class Iteration(TypedDict):
     step: float
 
 
-class _JobRequired(TypedDict):
+class Job(TypedDict):
+    """Background work of the service."""
+
     # Identifier.
     id: str
     # Kind of the job.
     kind: JobKind
-    # State of the job.
-    state: JobState
-
-
-class Job(_JobRequired, total=False):
-    """Background work of the service."""
-
     # Share of the work that is done, 0 to 1. Known only while walks are simulated; null otherwise.
     progress: Optional[float]
     # Reason if it failed. Null otherwise.
@@ -1523,6 +1482,8 @@ class Job(_JobRequired, total=False):
     result: Optional[str]
     # Attempts and worker of an open solve. Null otherwise.
     solve: Optional[OpenSolve]
+    # State of the job.
+    state: JobState
     # Study of the trial. Null for a backup.
     study_id: Optional[StudyId]
     # Trial of the job. Null for a backup.
@@ -1583,7 +1544,13 @@ class LabSessionClosing(TypedDict, total=False):
     note: str
 
 
-class _LabSessionProgressRequired(TypedDict):
+class LabSessionProgress(TypedDict):
+    """Session as shown in the lab, without anything that reveals a gait."""
+
+    # Current answer of the subject. Null if there is none.
+    answer: Optional[LabAnswer]
+    # Number to send with the answer. Null before the last walk and after an answer.
+    answer_number: Optional[int]
     # Whether the current answer can be retracted: the session is neither closed nor unblinded, and the answer is not a
     # safety report.
     can_be_retracted: bool
@@ -1591,23 +1558,14 @@ class _LabSessionProgressRequired(TypedDict):
     closed: bool
     # Identifier of the session.
     lab_session_id: LabSessionId
-    # Number of walks.
-    walks: int
-
-
-class LabSessionProgress(_LabSessionProgressRequired, total=False):
-    """Session as shown in the lab, without anything that reveals a gait."""
-
-    # Current answer of the subject. Null if there is none.
-    answer: Optional[LabAnswer]
-    # Number to send with the answer. Null before the last walk and after an answer.
-    answer_number: Optional[int]
     # Time at which the last walk was recorded. Null before the first walk.
     last_recorded: Optional[Instant]
     # Number to send with a report of an unsafe walk. Null until the subject may have walked with the device.
     report_number: Optional[int]
     # Next walk, 1 to 3. Null after the last walk and in a closed session.
     walk: Optional[int]
+    # Number of walks.
+    walks: int
 
 
 class LabSessionStep(TypedDict):
@@ -1628,10 +1586,16 @@ class LabSessionUnblinding(TypedDict):
     reason: str
 
 
-class _LabSessionViewRequired(TypedDict):
+class LabSessionView(TypedDict):
+    """Lab session, without blinded data."""
+
     # Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
     # and then imported.
     allocation_included: bool
+    # Current answer of the subject. Null if there is none.
+    answer: Optional[LabAnswer]
+    # Who closed the session, and when. Null while it is open.
+    closed: Optional[LabSessionStep]
     # Downloads of the controller files of the walks.
     controller_files: list[ControllerFileDownload]
     # Time of planning.
@@ -1652,19 +1616,10 @@ class _LabSessionViewRequired(TypedDict):
     trial_a: TrialId
     # The trial with gait B.
     trial_b: TrialId
-    # The three walks.
-    walks: list[WalkView]
-
-
-class LabSessionView(_LabSessionViewRequired, total=False):
-    """Lab session, without blinded data."""
-
-    # Current answer of the subject. Null if there is none.
-    answer: Optional[LabAnswer]
-    # Who closed the session, and when. Null while it is open.
-    closed: Optional[LabSessionStep]
     # Who unblinded the session, when and why. Null while it is blinded.
     unblinded: Optional[LabSessionStep]
+    # The three walks.
+    walks: list[WalkView]
 
 
 class LearnerSettings(TypedDict, total=False):
@@ -1776,11 +1731,15 @@ class LinearAlgebra(TypedDict):
     substitutions: int
 
 
-class _MeasurementFileRequired(TypedDict):
+class MeasurementFile(TypedDict):
+    """Measurement file, without its content."""
+
     # Who uploaded it.
     actor: str
     # Time of the upload.
     created_at: Instant
+    # Name of the file. Null if unknown.
+    file_name: Optional[str]
     # Identifier.
     id: MeasurementFileId
     # Kind of measurement.
@@ -1793,14 +1752,9 @@ class _MeasurementFileRequired(TypedDict):
     walk: int
 
 
-class MeasurementFile(_MeasurementFileRequired, total=False):
-    """Measurement file, without its content."""
+class Member(TypedDict):
+    """Member of a study."""
 
-    # Name of the file. Null if unknown.
-    file_name: Optional[str]
-
-
-class _MemberRequired(TypedDict):
     # Who added the member.
     added_by: str
     # Time at which the member was added.
@@ -1811,15 +1765,10 @@ class _MemberRequired(TypedDict):
     kind: MemberKind
     # Name of the user or the token.
     name: str
-    # Identifier of the study.
-    study_id: StudyId
-
-
-class Member(_MemberRequired, total=False):
-    """Member of a study."""
-
     # Role of a user. Null for a token.
     role: Optional[Role]
+    # Identifier of the study.
+    study_id: StudyId
 
 
 class MeshIntervals(TypedDict):
@@ -1835,7 +1784,13 @@ class MeshIntervals(TypedDict):
     ss2: int
 
 
-class _MilestoneRequired(TypedDict):
+class Milestone(TypedDict):
+    """The recommendation after one iteration of the study."""
+
+    # Cost of transport of the best trial. Null if the script that evaluated the trial did not report it.
+    cost_of_transport: Optional[float]
+    # Gait RMSE of the best trial, rad. Null if the script that evaluated the trial did not report it.
+    gait_rmse_rad: Optional[float]
     # Number of results so far, from 1.
     iteration: int
     # Number of the best trial.
@@ -1844,31 +1799,19 @@ class _MilestoneRequired(TypedDict):
     trial_id: TrialId
 
 
-class Milestone(_MilestoneRequired, total=False):
-    """The recommendation after one iteration of the study."""
+class ModelActivity(TypedDict):
+    """The activation of the muscle of a channel over the gait cycle."""
 
-    # Cost of transport of the best trial. Null if the script that evaluated the trial did not report it.
-    cost_of_transport: Optional[float]
-    # Gait RMSE of the best trial, rad. Null if the script that evaluated the trial did not report it.
-    gait_rmse_rad: Optional[float]
-
-
-class _ModelActivityRequired(TypedDict):
     # Activation at 0, 1, ..., 100 % of the cycle, 0 to 1.
     activation: list[float]
     # Name of the channel.
     channel: str
+    # Correlation between activation and measured activity over the cycle; null if one of them is constant.
+    correlation: Optional[float]
     # Name of the muscle.
     muscle: str
     # RMS difference between activation and measured activity.
     rms_difference: float
-
-
-class ModelActivity(_ModelActivityRequired, total=False):
-    """The activation of the muscle of a channel over the gait cycle."""
-
-    # Correlation between activation and measured activity over the cycle; null if one of them is constant.
-    correlation: Optional[float]
 
 
 class StickFigure(TypedDict):
@@ -1898,7 +1841,7 @@ class MotionFrame(_MotionFrameRequired, total=False):
 
     # Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent without
     # muscles.
-    activations: Optional[list[float]]
+    activations: list[float]
 
 
 class MuscleParametersGas(TypedDict, total=False):
@@ -2346,29 +2289,26 @@ class NewUser(TypedDict):
     role: Role
 
 
-class NextBlindPair(TypedDict, total=False):
+class NextBlindPair(TypedDict):
     """Next pair for a rater."""
 
     # The pair. Null if no comparison is pending.
     pair: Optional[BlindPair]
 
 
-class _OpenSolveRequired(TypedDict):
+class OpenSolve(TypedDict):
+    """A solve that has not ended."""
+
     # Number of times that it was given to a worker.
     attempts: int
     # Time of queueing.
     created_at: Instant
     # Attempts that crashed or ended with an error.
     failures: int
-    # Attempts whose worker stopped responding.
-    losses: int
-
-
-class OpenSolve(_OpenSolveRequired, total=False):
-    """A solve that has not ended."""
-
     # End of the lease, unless it is renewed. Null while the solve is queued.
     lease_until: Optional[Instant]
+    # Attempts whose worker stopped responding.
+    losses: int
     # Worker that has it. Null while it is queued.
     worker: Optional[str]
 
@@ -2463,29 +2403,26 @@ class Problem(_ProblemRequired, total=False):
     """An error response (problem details, RFC 9457)."""
 
     # Values that are accepted.
-    allowed: Optional[str]
+    allowed: str
     # Name of the field that was refused.
-    field: Optional[str]
+    field: str
     # Identifier of the request, as in the `X-Request-Id` header and the log.
-    request_id: Optional[str]
+    request_id: str
     # Value that was given.
     value: Any
 
 
-class _ProportionRequired(TypedDict):
-    # Number of successes.
-    count: int
-    # Number of cases.
-    of: int
-
-
-class Proportion(_ProportionRequired, total=False):
+class Proportion(TypedDict):
     """A proportion with its 95 % confidence interval (Wilson)."""
 
+    # Number of successes.
+    count: int
     # Upper bound of the interval.
     high: Optional[float]
     # Lower bound of the interval.
     low: Optional[float]
+    # Number of cases.
+    of: int
     # `count / of`.
     share: Optional[float]
 
@@ -2520,13 +2457,18 @@ class RaterInvitation(TypedDict):
     name: str
 
 
-class _RaterReliabilityRequired(TypedDict):
+class RaterReliability(TypedDict):
+    """Reliability of a rater in a study."""
+
     # Number of answers.
     answered: int
     # Number of "cannot tell" answers.
     cannot_tell: int
     # Number of blind pairs in which the rater could have known the allocation. The shares exclude them.
     could_have_known: int
+    # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Null until
+    # the rater is unblinded, because it would reveal allocations.
+    first_preferred: Optional[Proportion]
     # Name of the rater.
     rater: str
     # Share of repeated pairs with the same answer as before, among blind answers.
@@ -2535,14 +2477,6 @@ class _RaterReliabilityRequired(TypedDict):
     shown: int
     # Number of answers that reported a gait as unsafe.
     unsafe_gaits: int
-
-
-class RaterReliability(_RaterReliabilityRequired, total=False):
-    """Reliability of a rater in a study."""
-
-    # Share of blind preferences for the gait shown first. A value far from one half indicates position bias. Null until
-    # the rater is unblinded, because it would reveal allocations.
-    first_preferred: Optional[Proportion]
 
 
 class RaterUnblinding(TypedDict):
@@ -2554,22 +2488,19 @@ class RaterUnblinding(TypedDict):
     reason: str
 
 
-class _RecommendedRequired(TypedDict):
-    # The action: the values of all bounds, tuned or fixed.
-    bounds: Bounds
-    # Number of the trial.
-    number: int
-    # Trial of the action.
-    trial_id: TrialId
-
-
-class Recommended(_RecommendedRequired, total=False):
+class Recommended(TypedDict):
     """Recommended action."""
 
+    # The action: the values of all bounds, tuned or fixed.
+    bounds: Bounds
     # Cost of transport of the trial. Null if the script that evaluated the trial did not report it.
     cost_of_transport: Optional[float]
     # Gait RMSE of the trial, rad. Null if the script that evaluated the trial did not report it.
     gait_rmse_rad: Optional[float]
+    # Number of the trial.
+    number: int
+    # Trial of the action.
+    trial_id: TrialId
 
 
 class _RecommendationRequired(Recommended):
@@ -2645,21 +2576,18 @@ class ReferenceGaitDocument(_ReferenceGaitDocumentRequired, total=False):
     standard_deviation_rad: list[list[float]]
 
 
-class _ReferenceGaitMatchRequired(TypedDict):
-    # The reference gait.
-    reference_gait: ReferenceGait
-
-
-class ReferenceGaitMatch(_ReferenceGaitMatchRequired, total=False):
+class ReferenceGaitMatch(TypedDict):
     """A reference gait and the distance between the measured person and a subject."""
 
     # Distance to the reference gait, without a unit: `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`, with the difference in
     # height dh and in body mass dm. Null if the reference gait does not state height and mass.
     distance: Optional[float]
+    # The reference gait.
+    reference_gait: ReferenceGait
 
 
-_RelaxationRequired = TypedDict(
-    "_RelaxationRequired",
+Relaxation = TypedDict(
+    "Relaxation",
     {
         # Name of the bound.
         "bound": "str",
@@ -2673,21 +2601,16 @@ _RelaxationRequired = TypedDict(
         "solves": "int",
         # Number of starting points of the search at the `not_with` value. 0 if unknown.
         "starts": "int",
+        # The value nearest to the given one that was found to give a gait. Null if not even the loosest value does.
+        "to": "Optional[float]",
         # Whether the solve at the `not_with` value ended without a decision. If so, infeasibility is not certain.
         "undecided": "bool",
     },
 )
 
 
-class Relaxation(_RelaxationRequired, total=False):
-    """Effect of relaxing one tuned bound alone."""
-
-    # The value nearest to the given one that was found to give a gait. Null if not even the loosest value does.
-    to: Optional[float]
-
-
-_RelaxedBoundRequired = TypedDict(
-    "_RelaxedBoundRequired",
+RelaxedBound = TypedDict(
+    "RelaxedBound",
     {
         # Name of the bound.
         "bound": "str",
@@ -2697,19 +2620,14 @@ _RelaxedBoundRequired = TypedDict(
         "meaning": "str",
         # The loosest value that does not give a gait together with the others.
         "not_with": "float",
+        # The value nearest to the given one that gives a gait together with the others. Null if not even the loosest value
+        # does.
+        "to": "Optional[float]",
     },
 )
 
 
-class RelaxedBound(_RelaxedBoundRequired, total=False):
-    """Relaxation of one of several bounds."""
-
-    # The value nearest to the given one that gives a gait together with the others. Null if not even the loosest value
-    # does.
-    to: Optional[float]
-
-
-class RestoredAnswer(TypedDict, total=False):
+class RestoredAnswer(TypedDict):
     """The answer that counts again after an undo. Both fields are null if the undone answer replaced none."""
 
     # The new entry with the content of the replaced assessment.
@@ -2771,7 +2689,9 @@ class ReturnMap(TypedDict):
     speed_leak: float
 
 
-class _SafetyReportRequired(TypedDict):
+class SafetyReport(TypedDict):
+    """Safety report about a gait."""
+
     # Who reported it.
     author: str
     # Time of the report.
@@ -2785,15 +2705,10 @@ class _SafetyReportRequired(TypedDict):
     # What was reported. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell
     # which gait was shown first.
     note: str
-    # Trial of the gait.
-    trial_id: TrialId
-
-
-class SafetyReport(_SafetyReportRequired, total=False):
-    """Safety report about a gait."""
-
     # Newest review. Null while the report awaits review.
     review: Optional[SafetyReview]
+    # Trial of the gait.
+    trial_id: TrialId
 
 
 class SafetyReview(TypedDict):
@@ -2822,13 +2737,17 @@ class SearchSpace(TypedDict):
     dimensions: list[Dimension]
 
 
-class _SensitivityToBoundRequired(TypedDict):
+class SensitivityToBound(TypedDict):
+    """Sensitivity with respect to one tuned bound. Derivatives are per unit of the bound."""
+
     # The active constraints that contain the bound. Empty if small changes of the bound change nothing.
     active: list[ActiveConstraint]
     # Name of the bound.
     bound: str
     # Derivatives of the results of the gait.
     derivatives: ResultDerivatives
+    # One step of the bound in the search space, and its effect. Null if the study does not tune the bound.
+    grid_step: Optional[GridStep]
     # Lowest and highest value of the bound, in its unit: in between, the active constraints stay the same, to first
     # order. An end is null if there is no limit in that direction.
     interval: list[Optional[float]]
@@ -2838,14 +2757,13 @@ class _SensitivityToBoundRequired(TypedDict):
     value: float
 
 
-class SensitivityToBound(_SensitivityToBoundRequired, total=False):
-    """Sensitivity with respect to one tuned bound. Derivatives are per unit of the bound."""
+class Session(TypedDict):
+    """Sign-in session of a user."""
 
-    # One step of the bound in the search space, and its effect. Null if the study does not tune the bound.
-    grid_step: Optional[GridStep]
-
-
-class _SessionRequired(TypedDict):
+    # Client address at sign-in. Null if unknown.
+    address: Optional[str]
+    # User agent of the browser. Null if unknown.
+    browser: Optional[str]
     # Whether the user signed in with a one-time link rather than a password.
     by_link: bool
     # Time of sign-in.
@@ -2858,15 +2776,6 @@ class _SessionRequired(TypedDict):
     user_id: UserId
     # Name of the user.
     user_name: str
-
-
-class Session(_SessionRequired, total=False):
-    """Sign-in session of a user."""
-
-    # Client address at sign-in. Null if unknown.
-    address: Optional[str]
-    # User agent of the browser. Null if unknown.
-    browser: Optional[str]
 
 
 class SetPoints(TypedDict):
@@ -2994,21 +2903,20 @@ class SolveOptions(TypedDict, total=False):
     tolerance: float
 
 
-class _SolveProblemRequired(TypedDict):
+class SolveProblem(TypedDict):
+    """Input for `gaitwright solve --problem`: the gait problem, options and warm start."""
+
     # Options of the solver.
     options: SolveOptions
     # The gait problem.
     problem: GaitProblem
-
-
-class SolveProblem(_SolveProblemRequired, total=False):
-    """Input for `gaitwright solve --problem`: the gait problem, options and warm start."""
-
     # The warm start. Null for a cold start.
     warm_start: Optional[WarmStart]
 
 
-class _SolveReportRequired(TypedDict):
+class SolveReport(TypedDict):
+    """Numerical results of one solve."""
+
     # Mechanical cost of transport, dimensionless.
     cost_of_transport: float
     # Durations of the eight domains, s.
@@ -3023,10 +2931,14 @@ class _SolveReportRequired(TypedDict):
     inequalities: int
     # Interior-point iterations over all phases.
     iterations: int
+    # Breakdown of the linear algebra. Null if unknown.
+    linear_algebra: Optional[LinearAlgebra]
     # Largest violation of a constraint or of a limit on a variable, scaled.
     max_violation: float
     # Objective: cost of transport plus regularisation.
     objective: float
+    # How well the conditions of a local optimum are met. Null if unknown.
+    optimality: Optional[Optimality]
     # Time for evaluating functions and derivatives, s.
     seconds_evaluation: float
     # Time for linear algebra, s.
@@ -3054,22 +2966,17 @@ class _SolveReportRequired(TypedDict):
     vhip_m_s: list[float]
 
 
-class SolveReport(_SolveReportRequired, total=False):
-    """Numerical results of one solve."""
+class SolverRun(TypedDict):
+    """One run of the solver within a solve, from an initial guess or a warm start."""
 
-    # Breakdown of the linear algebra. Null if unknown.
-    linear_algebra: Optional[LinearAlgebra]
-    # How well the conditions of a local optimum are met. Null if unknown.
-    optimality: Optional[Optimality]
-
-
-class _SolverRunRequired(TypedDict):
     # Whether its gait is the result of the solve.
     chosen: bool
     # Gait RMSE where it ended, rad.
     gait_rmse_rad: float
     # Iterations over its phases.
     iterations: int
+    # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
+    local_optimum: Optional[int]
     # Objective where it ended.
     objective: float
     # Reason if it could not be completed; otherwise empty.
@@ -3080,13 +2987,6 @@ class _SolverRunRequired(TypedDict):
     status: SolveStatus
     # Starting point and method in words, such as `warm start`.
     strategy: str
-
-
-class SolverRun(_SolverRunRequired, total=False):
-    """One run of the solver within a solve, from an initial guess or a warm start."""
-
-    # Number of the local optimum in which it ended, counted from 1; null if it did not converge.
-    local_optimum: Optional[int]
 
 
 class StateChangeReason(TypedDict, total=False):
@@ -3105,7 +3005,9 @@ class StridesOnYield(TypedDict):
     yield_m: float
 
 
-class _StudyPlanRequired(TypedDict):
+class StudyPlan(TypedDict):
+    """Set-up of a study."""
+
     # Who answers comparisons.
     answer_source: AnswerSource
     # Values of bounds that are not tuned.
@@ -3141,19 +3043,14 @@ class _StudyPlanRequired(TypedDict):
     seed: int
     # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
-    # Identifier of the subject.
-    subject_id: SubjectId
-    # The gait from which trials are warm-started.
-    warm_start_from: WarmStartFrom
-
-
-class StudyPlan(_StudyPlanRequired, total=False):
-    """Set-up of a study."""
-
     # Total solve time, s, after which no new trial starts.
     solve_seconds_budget: Optional[float]
+    # Identifier of the subject.
+    subject_id: SubjectId
     # The study finishes when the best action has not changed over this many results.
     unchanged_limit: Optional[int]
+    # The gait from which trials are warm-started.
+    warm_start_from: WarmStartFrom
 
 
 class _StudyRequired(StudyPlan):
@@ -3220,7 +3117,20 @@ class StudyClone(TypedDict, total=False):
     start: bool
 
 
-class _StudyComparisonRequired(TypedDict):
+class StudyComparison(TypedDict):
+    """Study in a comparison."""
+
+    # Action of the recommended trial. Null if there is no recommendation.
+    best_action: Optional[Bounds]
+    # Cost of transport of the recommended trial. Null if there is no recommendation, or if the script that evaluated
+    # the trial did not report it.
+    best_cost_of_transport: Optional[float]
+    # Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
+    # trial did not report it. Null in every row if the compared studies have different reference gaits, because values
+    # against different reference gaits cannot be compared.
+    best_gait_rmse_rad: Optional[float]
+    # Number of the recommended trial. Null if there is no recommendation.
+    best_trial: Optional[int]
     # Identifier of the study.
     id: StudyId
     # Whether gaits are computed with muscles.
@@ -3237,22 +3147,6 @@ class _StudyComparisonRequired(TypedDict):
     state: StudyState
     # Numbers of trials by state.
     trials: TrialCounts
-
-
-class StudyComparison(_StudyComparisonRequired, total=False):
-    """Study in a comparison."""
-
-    # Action of the recommended trial. Null if there is no recommendation.
-    best_action: Optional[Bounds]
-    # Cost of transport of the recommended trial. Null if there is no recommendation, or if the script that evaluated
-    # the trial did not report it.
-    best_cost_of_transport: Optional[float]
-    # Gait RMSE of the recommended trial, rad. Null if there is no recommendation, or if the script that evaluated the
-    # trial did not report it. Null in every row if the compared studies have different reference gaits, because values
-    # against different reference gaits cannot be compared.
-    best_gait_rmse_rad: Optional[float]
-    # Number of the recommended trial. Null if there is no recommendation.
-    best_trial: Optional[int]
 
 
 class StudyExtension(TypedDict):
@@ -3352,48 +3246,39 @@ class TightenedBounds(TypedDict):
     variables: list[list[MarginEntry]]
 
 
-class _TrialRequired(TypedDict):
+class Trial(TypedDict):
+    """Trial of a study."""
+
     # The action: the values of all bounds, tuned or fixed.
     action: Bounds
     # Index of the action in the search space.
     action_index: int
-    # Time of proposal.
-    created_at: Instant
-    # Identifier.
-    id: TrialId
-    # Human-readable message about how the trial ended; may be empty.
-    message: str
-    # Number within the study, from 1, in the order of proposal.
-    number: int
-    # Reason for the trial.
-    reason: str
-    # State of the trial.
-    state: TrialState
-    # Identifier of the study to which the trial belongs.
-    study_id: StudyId
-    # Most violated constraints, worst first.
-    violations: list[Violation]
-
-
-class Trial(_TrialRequired, total=False):
-    """Trial of a study."""
-
     # Best trial when this one was proposed. Null if there was none.
     best_before: Optional[TrialId]
     # Cost of transport of a converged gait, dimensionless. Null if the trial has no converged gait, or if the script
     # that evaluated it did not report the value.
     cost_of_transport: Optional[float]
+    # Time of proposal.
+    created_at: Instant
     # Time at which it ended. Null while it is open.
     finished_at: Optional[Instant]
     # Gait RMSE of a converged gait, rad. Null if the trial has no converged gait, or if the script that evaluated it
     # did not report the value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Optional[float]
+    # Identifier.
+    id: TrialId
     # Number of interior-point iterations. Null without a completed solve.
     iterations: Optional[int]
     # Largest violation, scaled. Null without a completed solve.
     max_violation: Optional[float]
+    # Human-readable message about how the trial ended; may be empty.
+    message: str
+    # Number within the study, from 1, in the order of proposal.
+    number: int
     # Objective of the solve. Null without a completed solve.
     objective: Optional[float]
+    # Reason for the trial.
+    reason: str
     # All numerical results of the solve. Null without a completed solve.
     report: Optional[SolveReport]
     # Script that evaluates the trial. Null if the service does.
@@ -3402,8 +3287,14 @@ class Trial(_TrialRequired, total=False):
     seconds_total: Optional[float]
     # Time at which a worker first started it. Null before.
     started_at: Optional[Instant]
+    # State of the trial.
+    state: TrialState
     # How the solve ended. Null without a completed solve.
     status: Optional[SolveStatus]
+    # Identifier of the study to which the trial belongs.
+    study_id: StudyId
+    # Most violated constraints, worst first.
+    violations: list[Violation]
     # Trial whose gait is the warm start. Null for a cold start.
     warm_started_from: Optional[TrialId]
 
@@ -3484,7 +3375,13 @@ class TrialSensitivities(TypedDict):
     trial_id: TrialId
 
 
-class _UnblindedPairRequired(TypedDict):
+class UnblindedPair(TypedDict):
+    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
+
+    # Answer in terms of what was shown. Null if there is none yet.
+    answer: Optional[OrderedAnswer]
+    # Time of the answer. Null if there is none yet.
+    answered_at: Optional[Instant]
     # Whether the rater could have known the allocation.
     could_have_known: bool
     # Time at which the pair was drawn.
@@ -3497,23 +3394,14 @@ class _UnblindedPairRequired(TypedDict):
     number: int
     # Name of the rater.
     rater: str
+    # Earlier pair that it repeats. Null if it is not a repeat.
+    repeats: Optional[BlindPairId]
     # Trial shown first.
     shown_first: TrialId
     # Trial shown second.
     shown_second: TrialId
     # Identifier of the study.
     study_id: StudyId
-
-
-class UnblindedPair(_UnblindedPairRequired, total=False):
-    """Pair shown to a rater who has been unblinded, with the trial shown on each side."""
-
-    # Answer in terms of what was shown. Null if there is none yet.
-    answer: Optional[OrderedAnswer]
-    # Time of the answer. Null if there is none yet.
-    answered_at: Optional[Instant]
-    # Earlier pair that it repeats. Null if it is not a repeat.
-    repeats: Optional[BlindPairId]
 
 
 class UnblindedRater(TypedDict):
@@ -3525,23 +3413,24 @@ class UnblindedRater(TypedDict):
     study_id: StudyId
 
 
-class _UnchangedBoundRequired(TypedDict):
-    # Name of the bound.
-    bound: str
-
-
-class UnchangedBound(_UnchangedBoundRequired, total=False):
+class UnchangedBound(TypedDict):
     """A tuned bound and the range of its values for which a gait remains a solution."""
 
+    # Name of the bound.
+    bound: str
     # Smallest value, in the unit of the bound. Null if every smaller one leaves the gait as it is.
     least: Optional[float]
     # Largest value, in the unit of the bound. Null if every larger one leaves the gait as it is.
     most: Optional[float]
 
 
-class _UserRequired(TypedDict):
+class User(TypedDict):
+    """A person who signs in: administrator, clinician or rater."""
+
     # Time of creation.
     created_at: Instant
+    # Time at which the user was disabled. Null if the user is not disabled.
+    disabled_at: Optional[Instant]
     # Whether the user has a password. Otherwise only one-time links work.
     has_password: bool
     # Identifier.
@@ -3550,13 +3439,6 @@ class _UserRequired(TypedDict):
     name: str
     # Role, which determines the rights of the user.
     role: Role
-
-
-class User(_UserRequired, total=False):
-    """A person who signs in: administrator, clinician or rater."""
-
-    # Time at which the user was disabled. Null if the user is not disabled.
-    disabled_at: Optional[Instant]
 
 
 class Violation(TypedDict):
@@ -3570,23 +3452,20 @@ class Violation(TypedDict):
     unit: str
 
 
-class _WalkActivityRequired(TypedDict):
+class WalkActivity(TypedDict):
+    """Muscle activity of a walk over the gait cycle."""
+
     # Mean of each channel over the cycle, relative to the peak of walk 1.
     averages: list[float]
     # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
     # the peak of walk 1.
     channels: list[CycleActivity]
+    # EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
+    emg_rmse: Optional[EmgRmse]
     # Measurement file that it was computed from.
     measurement_file_id: MeasurementFileId
     # Number of the walk, 1 to 3.
     walk: int
-
-
-class WalkActivity(_WalkActivityRequired, total=False):
-    """Muscle activity of a walk over the gait cycle."""
-
-    # EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
-    emg_rmse: Optional[EmgRmse]
 
 
 class WalkModel(TypedDict):
@@ -3598,20 +3477,17 @@ class WalkModel(TypedDict):
     walk: int
 
 
-class _WalkViewRequired(TypedDict):
-    # Number of the walk, 1 to 3.
-    number: int
-    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
-    recorded_after_unblinding: bool
-
-
-class WalkView(_WalkViewRequired, total=False):
+class WalkView(TypedDict):
     """Walk of a session."""
 
     # Condition of the walk. Null while it is blinded.
     condition: Optional[WalkCondition]
+    # Number of the walk, 1 to 3.
+    number: int
     # Who recorded the walk, and when. Null if it is not recorded yet.
     recorded: Optional[LabSessionStep]
+    # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
+    recorded_after_unblinding: bool
 
 
 class WalkerSubject(TypedDict):

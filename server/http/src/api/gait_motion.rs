@@ -40,7 +40,7 @@ struct MotionFrame {
     /// Activations of the muscles HAM_L, GLU_L, HFL_L, GAS_L, VAS_L, SOL_L, TA_L, HAM_R, GLU_R, HFL_R. Absent
     /// without muscles.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<Vec<f64>>)]
+    #[schema(value_type = Vec<f64>, required = false)]
     activations: Option<[f64; 10]>,
 }
 

@@ -12,6 +12,7 @@ use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::job::{JobId, JobKind, JobState};
+use gaitwright_service::studies::job_cancellation;
 use gaitwright_service::studies::job_status::{self, JobStatus};
 use gaitwright_store::{BorrowedWriter, StudyId, TrialId, solve_jobs};
 use serde::{Deserialize, Serialize};
@@ -164,9 +165,9 @@ pub(super) async fn cancel(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let cancelled = job_status::cancel(&mut writer, &request.caller, app.runners(), id).await?;
+    let cancelled = job_cancellation::cancel(&mut writer, &request.caller, app.runners(), id).await?;
     let answer = request.done(&app, writer, &Job::from(cancelled)).await?;
-    job_status::stop(app.runners(), id).await;
+    job_cancellation::stop(app.runners(), id).await;
     Ok(answer)
 }
 

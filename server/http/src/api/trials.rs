@@ -18,8 +18,9 @@ use gait_optimizer::{IterationRecord, TunedBounds};
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::job::JobId;
+use gaitwright_service::studies::cancelled_trial;
 use gaitwright_service::studies::command;
-use gaitwright_store::trial_query::{self, Listing, SORTS, Start, TrialPlace};
+use gaitwright_store::trial_list::{self, Listing, SORTS, Start, TrialPlace};
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
 use serde::de::{Deserialize, Deserializer, Error as _};
@@ -93,7 +94,7 @@ pub(super) async fn of_study(
         limit: paging.to_read(),
         start: paging.after.clone().map_or(Start::Skip(0), Start::After),
     };
-    let listed = trial_query::of_study(&mut reader, id, &listing).await?;
+    let listed = trial_list::of_study(&mut reader, id, &listing).await?;
     let (listed, next) = paging.page(listed, |trial| trial.place.clone())?.into_parts();
     let mut found = Vec::with_capacity(listed.len());
     for trial in listed {
@@ -159,7 +160,7 @@ pub(super) async fn cancel(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let trial = command::cancel(&mut writer, &request.actor, id, "Cancelled on request.").await?;
+    let trial = cancelled_trial::cancel(&mut writer, &request.actor, id, "Cancelled on request.").await?;
     let answer = request.done(&app, writer, &Trial::from(trial)).await?;
     app.scheduler.cancel_solve(id).await;
     Ok(answer)

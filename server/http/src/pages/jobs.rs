@@ -8,7 +8,7 @@ use axum::extract::State;
 use axum::response::Redirect;
 use gaitwright_service::access::Run;
 use gaitwright_service::job::JobId;
-use gaitwright_service::studies::job_status;
+use gaitwright_service::studies::job_cancellation;
 use gaitwright_store::commit;
 
 /// `POST /jobs/{id}/cancel`.
@@ -18,9 +18,9 @@ pub(super) async fn cancel(
     Visible(id, _): Visible<JobId, Run>,
 ) -> Result<Redirect, PageError> {
     let mut writer = app.write().await?;
-    job_status::cancel(&mut writer, &authorized.caller, app.runners(), id).await?;
+    job_cancellation::cancel(&mut writer, &authorized.caller, app.runners(), id).await?;
     commit(writer).await?;
-    job_status::stop(app.runners(), id).await;
+    job_cancellation::stop(app.runners(), id).await;
     Ok(Redirect::to(&page_of(id)))
 }
 

@@ -26,7 +26,7 @@ use gaitwright_service::studies::lab::{
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trial_query::ListedTrial;
+use gaitwright_store::trial_list::ListedTrial;
 use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
 

@@ -37,7 +37,7 @@ pub(crate) struct EmgRmse {
     parts: Vec<f64>,
     /// Reasons to doubt the comparison. Absent if there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(value_type = Option<Vec<String>>)]
+    #[schema(value_type = Vec<String>, required = false)]
     warnings: Vec<String>,
 }
 

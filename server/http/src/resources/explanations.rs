@@ -51,12 +51,12 @@ pub(crate) struct Conflict {
     bounds: Vec<BoundValue>,
     /// Bounds of other conflicts that were relaxed when this conflict was found.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(value_type = Option<Vec<String>>)]
+    #[schema(value_type = Vec<String>, required = false)]
     without: Vec<String>,
     /// Requirements for natural walking that take part in a conflict between fixed constraints, in words; absent if
     /// there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(value_type = Option<Vec<String>>)]
+    #[schema(value_type = Vec<String>, required = false)]
     naturalness_terms: Vec<String>,
     /// Violations in the motion closest to feasibility that the search found, with all other tuned bounds at their
     /// loosest, worst first.

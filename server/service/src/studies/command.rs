@@ -1,14 +1,13 @@
-//! Commands for studies (start, pause, resume, stop) and trials (cancel, retry), each in one transaction.
+//! Commands for studies (start, pause, resume, stop) and the retry of trials, each in one transaction.
 
+use super::cancelled_trial;
 use super::lifecycle::{self, StudyTransition};
 use super::requeued_trial;
 use super::snapshot::has_changed;
-use super::trial_result;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trials::Trial;
 use gaitwright_store::{StudyId, TrialId, Writer, events, studies, trials};
 use serde_json::json;
 
@@ -54,7 +53,7 @@ pub async fn transition(
 pub(super) async fn stop(writer: &mut Writer, study: &Study, reason: &str) -> Result<Vec<TrialId>, Error> {
     let mut cancelled = Vec::new();
     for trial in trials::of_study(writer, study.id).await?.into_iter().filter(|trial| trial.state.is_open()) {
-        trial_result::cancelled(writer, trial.id, "The study was stopped.").await?;
+        cancelled_trial::end(writer, trial.id, "The study was stopped.").await?;
         cancelled.push(trial.id);
     }
     change_state(writer, study, StudyTransition::Stop, reason).await?;
@@ -72,16 +71,6 @@ async fn change_state(
         return Err(has_changed());
     }
     Ok(events::append(writer, study.id, "study_changed", &json!({ "state": state, "reason": reason })).await?)
-}
-
-/// Cancels an open trial.
-///
-/// # Errors
-/// [`Error::NotFound`], or [`Error::Conflict`] if the trial has ended.
-pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &str) -> Result<Trial, Error> {
-    trial_result::cancelled(writer, id, reason).await?;
-    audit::append(writer, actor, "trial.cancel", &format!("trial {id}"), &json!({ "reason": reason })).await?;
-    Ok(trials::get(writer, id).await?)
 }
 
 /// Queues a trial without a result again.

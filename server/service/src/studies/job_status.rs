@@ -1,23 +1,18 @@
-//! Status and cancellation of jobs: backups, and solves, certificates, execution reports and explanations of trials.
+//! Status of jobs: backups, and solves, certificates, execution reports and explanations of trials.
 //!
 //! Solves have a queue in the record, and requests for explanations a table. The state of every job follows from the record
 //! and the running process.
 
-use super::command;
 use super::execution::{self, Simulation};
 use super::explanation::{self, ExplanationEffort, ExplanationState};
 use super::scheduler::Scheduler;
-use crate::access::{Caller, Reach, Right};
-use crate::backups::{self, Backups};
+use crate::access::Reach;
+use crate::backups::Backups;
 use crate::error::Error;
 use crate::job::{JobId, JobState};
-use gaitwright_store::audit;
 use gaitwright_store::solve_jobs::{self, OpenSolve};
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{
-    Connection, StudyId, TrialId, Writer, accessible_studies, cancelled_jobs, certificates, explanations, trials,
-};
-use serde_json::json;
+use gaitwright_store::{Connection, StudyId, TrialId, accessible_studies, certificates, explanations, trials};
 
 /// Status of a job.
 #[derive(Debug, Clone)]
@@ -164,39 +159,4 @@ pub async fn open(db: &mut Connection, runners: Runners<'_>, reach: Reach) -> Re
     }
     all.sort_by_key(|job| job.id);
     Ok(all)
-}
-
-/// Cancels a job that has not ended. Its work stops once the change is durable and [`stop`] was called.
-///
-/// # Errors
-/// [`Error::Forbidden`] for the backup of an administrator, [`Error::NotFound`], or [`Error::Conflict`] when it has
-/// ended.
-pub async fn cancel(writer: &mut Writer, caller: &Caller, runners: Runners<'_>, id: JobId) -> Result<JobStatus, Error> {
-    let job = find(writer, runners, id).await?;
-    if !matches!(job.state, JobState::Queued | JobState::Running) {
-        return Err(Error::conflict(format!("Job {id} has ended, so it cannot be cancelled.")));
-    }
-    match id {
-        JobId::Backup(_) if !caller.may(Right::Administer) => {
-            return Err(Error::Forbidden("Only an administrator can cancel a backup.".to_owned()));
-        }
-        JobId::Backup(backup) => backups::cancel(writer, &caller.actor, backup).await?,
-        JobId::Solve(trial) => {
-            command::cancel(writer, &caller.actor, trial, "Cancelled on request.").await?;
-        }
-        JobId::Certificate(_) | JobId::ExecutionReport(_) | JobId::Explanation(_) => {
-            audit::append(writer, &caller.actor, cancelled_jobs::CANCELLED, &format!("job {id}"), &json!({})).await?;
-        }
-    }
-    Ok(JobStatus { state: JobState::Cancelled, progress: None, solve: None, ..job })
-}
-
-/// Stops the work of a job whose cancellation is durable.
-pub async fn stop(runners: Runners<'_>, id: JobId) {
-    match id {
-        JobId::Backup(backup) => runners.backups.stop(backup),
-        JobId::Certificate(_) | JobId::ExecutionReport(_) | JobId::Explanation(_) | JobId::Solve(_) => {
-            runners.scheduler.cancel_job(id).await;
-        }
-    }
 }

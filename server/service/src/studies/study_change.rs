@@ -1,7 +1,8 @@
 //! Changes a study: its name, tags, notes and limits. For pages and REST.
 
 use super::study_plan;
-use crate::error::{Error, FieldError};
+use super::tags::checked_tags;
+use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::{Study, StudyLimits, StudyState};
@@ -40,37 +41,8 @@ pub struct StudyChange {
     pub archived: Option<bool>,
 }
 
-/// Largest number of tags of a study, and of characters of a tag.
-const MOST_TAGS: usize = 10;
-const LONGEST_TAG: usize = 40;
 /// Maximum length of notes, characters.
 const LONGEST_NOTES: usize = 4000;
-
-/// Checks tags: trimmed, without repetitions, in alphabetical order.
-///
-/// # Errors
-/// [`Error::Invalid`] naming the field.
-pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
-    if tags.len() > MOST_TAGS {
-        return Err(FieldError::described(
-            "tags",
-            &format!("a list of {} tags", tags.len()),
-            "a list of at most 10 tags",
-        )
-        .into());
-    }
-    let mut checked = Vec::new();
-    for tag in tags {
-        let tag = printable::name("tags", tag, LONGEST_TAG)?;
-        if tag.contains(',') {
-            return Err(Error::invalid("tags", tag, "a tag without commas, because commas separate tags"));
-        }
-        checked.push(tag.to_owned());
-    }
-    checked.sort();
-    checked.dedup();
-    Ok(checked)
-}
 
 /// Checks tags and notes of an imported study.
 ///

@@ -6,15 +6,14 @@ use super::gait_rmse_answers::gait_rmse_answers;
 use super::local_optimum_jump;
 use super::requeued_trial::{broke, interrupted, tell};
 use super::snapshot::StudySnapshot;
-use super::trial_transitions::{self, TrialEvent};
+use super::trial_transitions;
 use crate::error::Error;
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::gaits::PackedGait;
 use gaitwright_store::solve_jobs::Lease;
 use gaitwright_store::trials::{TrialEnd, TrialState};
-use gaitwright_store::{Store, TrialId, Writer, attempts, commit, events, gaits, solve_jobs, studies, trials};
-use serde_json::json;
+use gaitwright_store::{Store, TrialId, attempts, commit, gaits, solve_jobs, studies, trials};
 use std::time::Duration;
 
 /// How often a result is compared again because the study received an answer in the meantime.
@@ -83,21 +82,6 @@ pub async fn ended(
     }
     // The worker is free already, so the trial is solved again, at most twice.
     broke(store, lease, "New answers kept arriving before the result could be recorded.").await
-}
-
-/// Cancels an open trial at a person's request.
-///
-/// # Errors
-/// [`Error::Conflict`] if the trial has ended; errors of the database.
-pub async fn cancelled(writer: &mut Writer, trial: TrialId, reason: &str) -> Result<(), Error> {
-    let row = trials::get(writer, trial).await?;
-    let state =
-        trial_transitions::after(row.state, TrialEvent::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
-    solve_jobs::cancel(writer, trial).await?;
-    let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
-    trials::finish(writer, trial, &end).await?;
-    let payload = json!({ "trial_id": trial, "number": row.number, "state": state });
-    Ok(events::append(writer, row.study_id, "trial_ended", &payload).await?)
 }
 
 /// The preferences about the new trial that Gait RMSE implies; none if people answer.

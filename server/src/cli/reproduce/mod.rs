@@ -9,6 +9,7 @@ use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem_files::reference_of;
+use super::resumed_study;
 use super::unattended_study::{self, Lines};
 use clap::{Args, ValueEnum};
 use gait_optimizer::{ReferenceGait, Subject};
@@ -184,7 +185,7 @@ impl ReproduceCommand {
             .find(|study| study.state == StudyState::Finished && study.plan.has_same_trials_as(&wanted));
         match same {
             Some(study) => Ok((study, true)),
-            None => Ok((Box::pin(unattended_study::study(store, new)).await?, false)),
+            None => Ok((Box::pin(resumed_study::resumed_or_new(store, new)).await?, false)),
         }
     }
 }

@@ -4,7 +4,7 @@
 use crate::format::{self, words};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_store::trial_query::{self, ListedTrial, Listing, SORTS, Start};
+use gaitwright_store::trial_list::{self, ListedTrial, Listing, SORTS, Start};
 use gaitwright_store::trials::{TrialCounts, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
@@ -129,7 +129,7 @@ impl TrialsTable {
         choice: TrialsQuery,
     ) -> Result<Self, Error> {
         let listing = choice.listing()?;
-        let listed = trial_query::of_study(db, study, &listing).await?;
+        let listed = trial_list::of_study(db, study, &listing).await?;
         let matching = listed.first().map_or(0, |row| row.matching);
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
         let page = |page: u32| TrialsQuery { page, ..choice.clone() }.link();

@@ -8,7 +8,7 @@ use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
-use gaitwright_store::trial_query::{self, ListedTrial, Listing, Start};
+use gaitwright_store::trial_list::{self, ListedTrial, Listing, Start};
 use gaitwright_store::trials::{self, Trial, TrialState};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
@@ -58,7 +58,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
     };
     let grounds = Grounds::read(db, study).await?;
     let mut kept: Vec<(ListedTrial, Trial)> = Vec::new();
-    for listed in trial_query::of_study(db, study, &listing).await? {
+    for listed in trial_list::of_study(db, study, &listing).await? {
         let trial = trials::get(db, listed.id).await?;
         if grounds.admit(&trial).is_ok() && !kept.iter().any(|(_, other)| is_same_gait(other, &trial)) {
             kept.push((listed, trial));
