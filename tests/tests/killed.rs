@@ -194,6 +194,94 @@ fn killed_service_loses_no_acknowledged_write_and_finishes_with_the_same_trials(
     println!("{kills} kills, {} acknowledged writes, all there", acknowledged.len());
 }
 
+/// Has the gait of a trial certified, and returns whether it passed.
+fn is_certified(address: &str, trial: &Value) -> bool {
+    let path = format!("/api/v1/trials/{}/certificate", trial.as_str().unwrap());
+    post(address, &path, &json!({})).unwrap();
+    for _ in 0..3000 {
+        let certificate = get(address, &path).unwrap();
+        if certificate.status == 200 {
+            return certificate.json()["passed"] == true;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("the gait is not certified");
+}
+
+/// The preferences of a study that count, each with its identifier and content.
+fn in_force(address: &str, study: &str) -> Vec<(String, Value)> {
+    let answers = get(address, &format!("/api/v1/studies/{study}/preferences?limit=1000")).unwrap().items();
+    let standing = answers.as_array().unwrap().iter().filter(|answer| answer["retraction"].is_null());
+    standing.map(|answer| (answer["id"].as_str().unwrap().to_owned(), answer["content"].clone())).collect()
+}
+
+/// An undo retracts the changed answer and brings the former one back in one transaction: after a kill, one of the two
+/// counts, and the former one if the undo was acknowledged.
+#[test]
+fn killed_undo_has_happened_wholly_or_not_at_all() {
+    let kills: u32 = std::env::var("GAITWRIGHT_KILLS").ok().and_then(|text| text.parse().ok()).unwrap_or(12);
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("undo.db");
+    let mut random = 20_261_128;
+    let (mut acknowledged, mut done, mut not_done) = (0, 0, 0);
+    let mut process = Process::start(&database);
+    let study = start_study(&process.address);
+    wait_until_finished(&process.address, &study);
+    let trials = get(&process.address, &format!("/api/v1/studies/{study}/trials")).unwrap().items();
+    let converged = trials.as_array().unwrap().iter().filter(|trial| trial["state"] == "converged");
+    let mut walkable = converged.map(|trial| &trial["id"]).filter(|id| is_certified(&process.address, id));
+    let (a, b) = (walkable.next().unwrap(), walkable.next().unwrap());
+    let computed = in_force(&process.address, &study).len();
+    let list = format!("/api/v1/studies/{study}/preferences");
+    let answer = |address: &str, preferred: &str, replaces: Option<&str>| {
+        let body = json!({"trial_a": a, "trial_b": b, "answer": preferred, "source": "clinician", "author": "K",
+            "replaces": replaces});
+        let given = post(address, &list, &body).unwrap();
+        assert_eq!(given.status, 201, "{}", given.body);
+        given.json()["id"].as_str().unwrap().to_owned()
+    };
+    answer(&process.address, "a", None);
+    // Kills are spread over twice the time that an undisturbed undo takes.
+    let mut usual = Duration::ZERO;
+    for kill in 0..=kills {
+        let standing = in_force(&process.address, &study);
+        assert_eq!(standing.len(), computed + 1);
+        let (former, former_content) = standing.last().unwrap().clone();
+        let changed = answer(&process.address, "b", Some(&former));
+        let (address, path) = (process.address.clone(), format!("/api/v1/preferences/{changed}/undo"));
+        let undo = std::thread::spawn(move || post(&address, &path, &json!({})).is_ok_and(|reply| reply.status < 300));
+        let begun = std::time::Instant::now();
+        if kill == 0 {
+            while !undo.is_finished() {
+                std::thread::sleep(Duration::from_micros(100));
+            }
+            usual = begun.elapsed();
+        } else {
+            let longest = u64::try_from(2 * usual.as_micros()).unwrap();
+            std::thread::sleep(Duration::from_micros(splitmix(&mut random) % longest));
+        }
+        drop(process);
+        let confirmed = undo.join().unwrap();
+        assert!(confirmed || kill > 0, "an undisturbed undo");
+        process = Process::start(&database);
+        let standing = in_force(&process.address, &study);
+        assert_eq!(standing.len(), computed + 1, "exactly one answer about the two gaits counts");
+        let (id, content) = standing.last().unwrap().clone();
+        let happened = id != changed;
+        assert_eq!(content == former_content, happened, "{content}");
+        assert!(happened || !confirmed, "the undo was acknowledged and is lost");
+        acknowledged += u32::from(confirmed);
+        if happened {
+            done += 1;
+        } else {
+            not_done += 1;
+            let undone = post(&process.address, &format!("/api/v1/preferences/{changed}/undo"), &json!({})).unwrap();
+            assert!(undone.status < 300, "{}", undone.body);
+        }
+    }
+    println!("{kills} kills: {acknowledged} undos acknowledged, {done} happened, {not_done} did not");
+}
+
 #[test]
 fn second_process_is_refused_while_the_first_owns_the_record() {
     let folder = tempfile::tempdir().unwrap();
