@@ -8,8 +8,8 @@ use crate::gait::between_nodes::instant;
 const POWER_SAMPLES: usize = 32;
 
 /// Mechanical cost of transport `sum_i integral |P_i| dt / (m g D)` over the six joint powers `P_i = u_i qd_(3+i)` of the
-/// continuous motion of a well-formed gait, by the midpoint rule; dimensionless. The objective smooths |P|.
-pub fn unsmoothed_cost_of_transport(gait: &Gait, total_mass_kg: f64) -> f64 {
+/// continuous motion of a well-formed gait, by the midpoint rule; dimensionless. The objective has a smoothed |P|, which is smaller.
+pub fn cost_of_transport(gait: &Gait, total_mass_kg: f64) -> f64 {
     let mut effort_j = 0.0;
     for domain in &gait.domains {
         let samples = (domain.q.len() - 1) * POWER_SAMPLES;

@@ -118,7 +118,7 @@ fn gait_problem_matches_independent_sums() {
         program.weights.tracking = 1.0;
         let parts = program.objective_parts(&x);
         for (ours, key) in [
-            (parts.cost_of_transport, "mcot"),
+            (parts.smoothed_cost_of_transport, "mcot"),
             (parts.regularisation, "reg"),
             (parts.tracking, "track"),
             (parts.energy_j, "energy"),

@@ -2,7 +2,7 @@
 
 use super::differences_from_defaults::{Difference, differences};
 use crate::body::WalkerModel;
-use crate::cost_of_transport::unsmoothed_cost_of_transport;
+use crate::cost_of_transport::cost_of_transport;
 use crate::gait::Gait;
 use crate::model_error::ModelError;
 use crate::subject::Subject;
@@ -23,9 +23,8 @@ pub struct CertifiedGait {
     pub muscles: bool,
     /// Values of the device and of the settings that differ from AMPRO3 and the default settings.
     pub differences: Vec<Difference>,
-    /// Mechanical cost of transport with the magnitudes |P| of the joint powers, dimensionless. The objective, and with
-    /// it the report of a solve, has a smoothed magnitude, which is smaller.
-    pub unsmoothed_cost_of_transport: f64,
+    /// Mechanical cost of transport, from absolute joint powers; dimensionless.
+    pub cost_of_transport: f64,
 }
 
 impl CertifiedGait {
@@ -43,7 +42,7 @@ impl CertifiedGait {
             device: gait.device.name.clone(),
             muscles: gait.muscles,
             differences: differences(gait)?,
-            unsmoothed_cost_of_transport: unsmoothed_cost_of_transport(gait, total_mass_kg),
+            cost_of_transport: cost_of_transport(gait, total_mass_kg),
         })
     }
 }

@@ -1,4 +1,4 @@
-//! The objective: mechanical cost of transport, regularisation, and tracking of the reference gait.
+//! The objective: smoothed cost of transport, regularisation, and tracking of the reference gait.
 //!
 //! `f = w_cot E / (m g D) + w_track track + reg` with composite Simpson weights w_k and
 //!
@@ -17,9 +17,9 @@ use crate::settings::Regularisation;
 /// The parts of the objective before weighting.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ObjectiveParts {
-    /// Mechanical cost of transport E / (m g D).
-    pub cost_of_transport: f64,
-    /// Mechanical effort E of a stride, J.
+    /// Smoothed cost of transport E / (m g D).
+    pub smoothed_cost_of_transport: f64,
+    /// Smoothed mechanical effort E of a stride, J.
     pub energy_j: f64,
     /// Regularisation, with its weights.
     pub regularisation: f64,
@@ -74,8 +74,8 @@ fn smooth_power(power: f64, smoothing: f64) -> [f64; 3] {
     [root - smoothing, power / root, smoothing * smoothing / (root * root * root)]
 }
 
-/// Mean mechanical power of a domain, W, from the Simpson weight, torques and joint velocities of each node.
-pub(crate) fn mean_power(
+/// Mean smoothed power of a domain, W, from the Simpson weight, torques and joint velocities of each node.
+fn mean_power(
     nodes: impl Iterator<Item = (f64, [f64; JOINTS], [f64; JOINTS])>,
     regularisation: &Regularisation,
 ) -> f64 {
@@ -86,11 +86,6 @@ pub(crate) fn mean_power(
         }
     }
     sum
-}
-
-/// Mechanical cost of transport of the effort of a stride, dimensionless.
-pub(crate) fn cost_of_transport(energy_j: f64, total_mass_kg: f64, stride_length_m: f64) -> f64 {
-    energy_j / (total_mass_kg * GRAVITY * stride_length_m)
 }
 
 /// The parts.
@@ -125,7 +120,7 @@ pub(super) fn parts(program: &GaitProgram, x: &[f64]) -> ObjectiveParts {
         result.tracking += tracking / domain.points as f64;
     }
     let stride = layout.value(x, layout.stride_length);
-    result.cost_of_transport = cost_of_transport(result.energy_j, program.model.total_mass, stride);
+    result.smoothed_cost_of_transport = result.energy_j / (program.model.total_mass * GRAVITY * stride);
     result
 }
 
@@ -140,7 +135,9 @@ impl GaitProgram {
 pub(super) fn value(program: &GaitProgram, x: &[f64]) -> f64 {
     let parts = parts(program, x);
     let weights = &program.weights;
-    weights.cost_of_transport * parts.cost_of_transport + weights.tracking * parts.tracking + parts.regularisation
+    weights.cost_of_transport * parts.smoothed_cost_of_transport
+        + weights.tracking * parts.tracking
+        + parts.regularisation
 }
 
 /// Gradient with respect to the stored, scaled variables.

@@ -2,11 +2,10 @@
 
 use super::solve_report::SolveReport;
 use crate::body::WalkerModel;
-use crate::gait::{DomainTrajectory, Gait};
-use crate::gait_problem::objective::{cost_of_transport, mean_power};
+use crate::cost_of_transport::cost_of_transport;
+use crate::gait::Gait;
 use crate::gait_rmse::gait_rmse;
 use crate::model_error::ModelError;
-use crate::quadrature::simpson;
 use crate::reference::ReferenceGait;
 
 /// Relative tolerance between two computations of a result, which may run on different processors.
@@ -15,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 /// The results of a report that follow from the gait and the reference gait.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaitResults {
-    /// Mechanical cost of transport, dimensionless.
+    /// Mechanical cost of transport, from absolute joint powers; dimensionless.
     pub cost_of_transport: f64,
     /// Gait RMSE, rad.
     pub gait_rmse_rad: f64,
@@ -44,9 +43,8 @@ impl GaitResults {
     /// The results of a well-formed gait of this walker.
     pub(crate) fn of_well_formed(gait: &Gait, model: &WalkerModel, reference: &ReferenceGait) -> Self {
         let rmse = gait_rmse(gait, reference);
-        let energy_j: f64 = gait.domains.iter().map(|domain| energy_j(gait, domain)).sum();
         Self {
-            cost_of_transport: cost_of_transport(energy_j, model.total_mass, gait.stride_length_m),
+            cost_of_transport: cost_of_transport(gait, model.total_mass),
             gait_rmse_rad: rmse.total,
             gait_rmse_parts_rad: rmse.parts,
             speed_m_s: gait.speed_m_s,
@@ -90,12 +88,4 @@ impl GaitResults {
             ("vhip_m_s", self.vhip_m_s.to_vec()),
         ]
     }
-}
-
-/// Mechanical effort in a domain, J.
-fn energy_j(gait: &Gait, domain: &DomainTrajectory) -> f64 {
-    let points = domain.u.len();
-    let nodes = domain.u.iter().zip(&domain.qd).enumerate();
-    let nodes = nodes.map(|(k, (u, qd))| (simpson(k, points), *u, std::array::from_fn(|i| qd[3 + i])));
-    domain.duration_s * mean_power(nodes, &gait.settings.regularisation)
 }

@@ -144,9 +144,9 @@ pub struct SolveReport {
     pub started_from: StartedFrom,
     /// Number of iterations over all phases.
     pub iterations: usize,
-    /// Objective: cost of transport plus regularisation and naturalness terms.
+    /// Objective: smoothed cost of transport plus regularisation and naturalness terms.
     pub objective: f64,
-    /// Mechanical cost of transport, dimensionless.
+    /// Mechanical cost of transport, from absolute joint powers; dimensionless.
     pub cost_of_transport: f64,
     /// Gait RMSE: sum over the five human coordinates, rad.
     pub gait_rmse_rad: f64,

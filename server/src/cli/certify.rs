@@ -53,10 +53,7 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
                 .iter()
                 .map(|difference| format!("  differs from the built-in problem: {}", difference.in_words())),
         );
-        lines.push(format!(
-            "  cost of transport {:.4} (from absolute joint powers, which the objective smooths)",
-            certified.unsmoothed_cost_of_transport
-        ));
+        lines.push(format!("  cost of transport {:.4}", certified.cost_of_transport));
     }
     lines.extend(certificate.failures_in_words().iter().map(|failure| format!("  failure: {failure}")));
     for check in &certificate.checks {

@@ -702,6 +702,9 @@ class CertifiedDifference(TypedDict):
 class CertifiedGait(TypedDict):
     """What a certificate is about, computed from the gait."""
 
+    # Mechanical cost of transport, from absolute joint powers; dimensionless. It is computed from the gait, and so is
+    # that of its trial.
+    cost_of_transport: float
     # Name of the device. `differences` shows whether its values are those of the built-in device.
     device: str
     # Values of the device and of the settings that differ from AMPRO3 and the default settings.
@@ -714,9 +717,6 @@ class CertifiedGait(TypedDict):
     optimizer_version: str
     # The subject.
     subject: CertifiedSubject
-    # Mechanical cost of transport, computed with the unsmoothed magnitudes of the joint powers. The objective, and
-    # therefore the `cost_of_transport` of a trial, uses smoothed magnitudes, which are smaller.
-    unsmoothed_cost_of_transport: float
 
 
 class CertifiedSubject(TypedDict):
@@ -2917,7 +2917,7 @@ class SolveProblem(TypedDict):
 class SolveReport(TypedDict):
     """Numerical results of one solve."""
 
-    # Mechanical cost of transport, dimensionless.
+    # Mechanical cost of transport, from absolute joint powers; dimensionless.
     cost_of_transport: float
     # Durations of the eight domains, s.
     durations_s: list[float]
@@ -2935,7 +2935,7 @@ class SolveReport(TypedDict):
     linear_algebra: Optional[LinearAlgebra]
     # Largest violation of a constraint or of a limit on a variable, scaled.
     max_violation: float
-    # Objective: cost of transport plus regularisation.
+    # Objective: smoothed cost of transport plus regularisation and terms for natural walking.
     objective: float
     # How well the conditions of a local optimum are met. Null if unknown.
     optimality: Optional[Optimality]

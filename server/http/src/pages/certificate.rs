@@ -35,8 +35,8 @@ impl InWords {
             let differences: Vec<String> = certified.differences.iter().map(Difference::in_words).collect();
             let words = if differences.is_empty() { "none".to_owned() } else { differences.join("; ") };
             values.push(("Differences from the built-in device and the default settings", words));
-            let cost = format::number(certified.unsmoothed_cost_of_transport);
-            values.push(("Cost of transport from absolute joint powers, not smoothed", cost));
+            let cost = format::number(certified.cost_of_transport);
+            values.push(("Cost of transport", cost));
         }
         if let Some(map) = &certificate.return_map {
             values.push(("Largest Poincaré multiplier", format::number(map.largest)));

@@ -71,9 +71,9 @@ pub(crate) struct CertifiedGait {
     muscles: bool,
     /// Values of the device and of the settings that differ from AMPRO3 and the default settings.
     differences: Vec<CertifiedDifference>,
-    /// Mechanical cost of transport, computed with the unsmoothed magnitudes of the joint powers. The objective, and
-    /// therefore the `cost_of_transport` of a trial, uses smoothed magnitudes, which are smaller.
-    unsmoothed_cost_of_transport: f64,
+    /// Mechanical cost of transport, from absolute joint powers; dimensionless. It is computed from the gait, and so is that
+    /// of its trial.
+    cost_of_transport: f64,
 }
 
 impl From<certificate::CertifiedGait> for CertifiedGait {
@@ -85,7 +85,7 @@ impl From<certificate::CertifiedGait> for CertifiedGait {
             device,
             muscles,
             differences,
-            unsmoothed_cost_of_transport,
+            cost_of_transport,
         } = gait;
         Self {
             gait_sha256,
@@ -94,7 +94,7 @@ impl From<certificate::CertifiedGait> for CertifiedGait {
             device,
             muscles,
             differences: differences.into_iter().map(Into::into).collect(),
-            unsmoothed_cost_of_transport,
+            cost_of_transport,
         }
     }
 }

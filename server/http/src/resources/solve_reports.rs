@@ -70,9 +70,9 @@ pub(crate) struct SolveReport {
     /// Interior-point iterations over all phases.
     #[schema(value_type = u64)]
     iterations: usize,
-    /// Objective: cost of transport plus regularisation.
+    /// Objective: smoothed cost of transport plus regularisation and terms for natural walking.
     objective: f64,
-    /// Mechanical cost of transport, dimensionless.
+    /// Mechanical cost of transport, from absolute joint powers; dimensionless.
     cost_of_transport: f64,
     /// Gait RMSE: sum over the five human coordinates, rad.
     gait_rmse_rad: f64,
