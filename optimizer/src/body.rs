@@ -6,17 +6,19 @@
 //! `psi = (torso, thigh_L, shank_L, foot_L, thigh_R, shank_R, foot_R)` are counter-clockwise in the (x forward, z up)
 //! plane: `psi = A q[2..]` with the constant matrix A of [`coordinates`].
 
-mod anatomy;
 pub mod anthropometry;
 pub mod coordinates;
 pub mod dynamics;
+mod link_kinematics;
 pub mod point;
+mod sides_and_axes;
 
-pub use anatomy::{Axis, FootPoint, Side};
 pub use anthropometry::{Body, WalkerModel};
 pub use coordinates::{COORDINATES, JOINTS, LINKS, link_angles, to_generalised};
-pub use dynamics::{InverseDynamics, PointState};
+pub use dynamics::InverseDynamics;
+pub use link_kinematics::PointState;
 pub use point::{Chain, ContactPoint, LegGeometry};
+pub use sides_and_axes::{Axis, FootPoint, Side};
 
 /// Gravitational acceleration of the model, m/s².
 pub const GRAVITY: f64 = 9.81;

@@ -2,7 +2,7 @@
 //!
 //! The plant has a floating base, compliant ground under heel and toe of both feet, Coulomb friction, joint stops, and
 //! drives with limited torque and torque rate (`plant`, `ground`, `actuator`). The prosthesis tracks the gait with what
-//! it can measure (`prosthesis`, `sensors`); the human joints track it compliantly (`human`). Both tell the time of the
+//! it can measure (`prosthesis`, `sensors`); the human joints track it compliantly (`human_joints`). Both tell the time of the
 //! stride from a phase variable (`stride_clock`). Gains and plant are the same for every gait.
 //!
 //! A random walk has a random body mass, speed at the start, push, delay, sensor noise and ground. The report says how
@@ -25,17 +25,19 @@ mod sensors;
 mod simulated_walk;
 mod stride_clock;
 mod terrain;
+mod undisturbed_walk;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod simulation_tests;
 
-pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, StridesOnYield, SurvivedPushes};
+pub use execution_report::{ExecutionReport, SimulatedWalksOnGround, SurvivedPushes};
+pub use undisturbed_walk::StridesOnYield;
 
 use crate::cancel_token::CancelToken;
 use crate::gait::Gait;
 use crate::model_error::ModelError;
-use random_disturbances::{Disturbance, LADDER_N_S, MassChanges, Push, YIELD_LADDER_M};
+use random_disturbances::{Disturbance, LADDER_N_S, MassChanges, Push};
 use serde::{Deserialize, Serialize};
 use simulated_walk::{SimulatedWalker, WalkEnd, WalkOutcome};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -133,13 +135,7 @@ pub fn simulate(
         }
         grounds.push(SimulatedWalksOnGround::of(ground_m, &outcomes));
     }
-    let strides_by_yield = YIELD_LADDER_M
-        .into_iter()
-        .map(|yield_m| {
-            let outcome = walker.walk(&Disturbance { yield_m, ..Disturbance::none() }, strides)?;
-            Ok(StridesOnYield { yield_m, strides: outcome.strides })
-        })
-        .collect::<Result<_, ModelError>>()?;
+    let strides_by_yield = StridesOnYield::of(&walker, strides)?;
     let pushes = if undisturbed.end == WalkEnd::Completed { Some(survived_pushes(&walker, strides)?) } else { None };
     Ok(Some(ExecutionReport {
         format_version: FORMAT_VERSION,

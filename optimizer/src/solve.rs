@@ -17,6 +17,7 @@ mod solve_outcome;
 mod solve_report;
 mod solver_runs;
 mod solver_settings;
+mod time_limit;
 mod warm_start;
 
 pub use crate::cancel_token::CancelToken;

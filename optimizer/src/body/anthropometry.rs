@@ -3,9 +3,9 @@
 //! Winter, Biomechanics and Motor Control of Human Movement, 4th ed. 2009, tables 4.1 and figure 4.1 (masses and
 //! gyration radii as fractions of body mass and segment length, lengths as fractions of height).
 
-use super::anatomy::{FootPoint, Side};
 use super::coordinates::{LINKS, THIGH_L, THIGH_R, TORSO};
 use super::point::{Chain, ContactPoint, LegGeometry};
+use super::sides_and_axes::{FootPoint, Side};
 use crate::device::Device;
 use crate::model_error::ModelError;
 use crate::subject::Subject;

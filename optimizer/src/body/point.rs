@@ -1,7 +1,7 @@
 //! Points fixed to links, and the contact points of the feet: position, velocity and acceleration.
 
-use super::anatomy::{FootPoint, Side};
 use super::coordinates::{LINKS, THIGH_L, THIGH_R, link_angles};
+use super::sides_and_axes::{FootPoint, Side};
 
 /// A point as a chain of vectors fixed to links: `p = (px, pz) + sum_j R(psi_j) (ux_j, uz_j)`.
 #[derive(Debug, Clone, PartialEq, Default)]

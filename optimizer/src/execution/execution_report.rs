@@ -1,6 +1,7 @@
 //! The result of simulated walks.
 
 use super::simulated_walk::{WalkEnd, WalkOutcome};
+use super::undisturbed_walk::StridesOnYield;
 use crate::statistics::wilson_interval;
 use serde::{Deserialize, Serialize};
 
@@ -47,16 +48,6 @@ pub struct SurvivedPushes {
     pub backwards_n_s: f64,
     /// Largest push of the series, N s.
     pub largest_tried_n_s: f64,
-}
-
-/// An undisturbed walk on ground of some stiffness.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StridesOnYield {
-    /// How far the ground yields under body weight, m.
-    pub yield_m: f64,
-    /// Completed strides.
-    pub strides: u32,
 }
 
 /// The execution of a gait, simulated by a model other than the optimiser's.

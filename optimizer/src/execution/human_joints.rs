@@ -39,8 +39,6 @@ const PASSIVE_DAMPING_N_M_S_RAD: f64 = 1.0;
 
 /// Smallest planned rate of the hip position that tells the time, m/s.
 const SLOWEST_HIP_M_S: f64 = 0.1;
-/// Share of a step after which a loaded swing foot has landed.
-const LANDING: f64 = 0.5;
 /// First domain of the stance of the left leg.
 const LEFT_STANCE: usize = 4;
 
@@ -87,18 +85,11 @@ impl<'a> Human<'a> {
         left.update(motion.foot_load(Side::Left));
         right.update(motion.foot_load(Side::Right));
         let (middle_s, end_s) = (self.plan.start_s(LEFT_STANCE), self.plan.duration_s);
-        let late = |start_s: f64, end_s: f64| self.clock.time_s >= start_s + LANDING * (end_s - start_s);
         let in_left_stance = self.clock.time_s >= middle_s;
-        let strikes = StrikesInPeriod {
-            left: !in_left_stance && late(0.0, middle_s) && left.take_heel_strike(),
-            right: in_left_stance && late(middle_s, end_s) && right.take_heel_strike(),
-        };
-        if strikes.left {
-            self.clock.time_s = middle_s;
-        } else if strikes.right {
-            self.clock.time_s = 0.0;
+        StrikesInPeriod {
+            left: !in_left_stance && self.clock.restart_at(middle_s, (0.0, middle_s), left),
+            right: in_left_stance && self.clock.restart_at(0.0, (middle_s, end_s), right),
         }
-        strikes
     }
 
     /// One period of the controller.

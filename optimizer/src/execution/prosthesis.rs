@@ -22,8 +22,6 @@ const SWING: [Gains; 2] = [Gains::new(250.0, 12.0), Gains::new(15.0, 0.4)];
 /// Time from zero to the largest torque, s (assumption).
 const RISE_S: f64 = 0.04;
 
-/// Share of swing after which a loaded foot has landed.
-const LANDING: f64 = 0.5;
 /// First domain after the lift of the prosthetic foot.
 const SWING_STARTS: usize = 6;
 
@@ -56,9 +54,7 @@ impl<'a> Prosthesis<'a> {
         self.foot.update(measured.load_n);
         let swing_s = self.plan.start_s(SWING_STARTS);
         let end_s = self.plan.duration_s;
-        if self.clock.time_s > swing_s + LANDING * (end_s - swing_s) && self.foot.take_heel_strike() {
-            self.clock.time_s = 0.0;
-        }
+        self.clock.restart_at(0.0, (swing_s, end_s), &mut self.foot);
         let planned = self.plan.at(self.clock.time_s);
         let (q, qd) = (&planned.q, &planned.qd);
         let thigh = (q[6] - q[2], qd[6] - qd[2]);

@@ -18,9 +18,6 @@ pub(super) const PUSH_DURATION_S: f64 = 0.1;
 /// Pushes of the ladder, N s.
 pub(super) const LADDER_N_S: [f64; 8] = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0];
 
-/// Depths of the ground under body weight, m, from hard to soft; one is [`YIELD_M`].
-pub(super) const YIELD_LADDER_M: [f64; 5] = [0.001, 0.002, 0.005, YIELD_M, 0.02];
-
 /// A forward push at the hip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Push {

@@ -2,8 +2,10 @@
 //!
 //! The clock advances with time. Where a measured phase variable moves with the planned one, the clock is corrected until
 //! they agree; where the phase variable stands still or turns round, time alone advances the clock. It never runs
-//! backwards, and it waits at the end of a section for the event that starts the next one.
+//! backwards, and it waits at the end of a section for the event that starts the next one. A heel strike
+//! restarts it.
 
+use super::foot_contact::FootContact;
 use crate::body::LegGeometry;
 
 /// Rate at which an error of the phase decays, 1/s.
@@ -15,6 +17,9 @@ const LARGEST_CORRECTION: f64 = 1.0;
 const SLOWEST_HIP_M_S: f64 = 0.3;
 /// Smallest planned rate of the thigh angle that tells the time, rad/s.
 const SLOWEST_THIGH_RAD_S: f64 = 1.0;
+/// Share of a section after which a loaded swing foot has landed.
+const LANDING: f64 = 0.5;
+
 /// A phase variable: as measured, and as planned at the time of the clock.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StridePhase {
@@ -62,6 +67,17 @@ pub(super) struct StrideClock {
 }
 
 impl StrideClock {
+    /// Restarts at `planned_s`, where the plan has this heel strike, if the foot strikes late in the section in which it
+    /// swings. Returns whether it does.
+    pub(super) fn restart_at(&mut self, planned_s: f64, (start_s, end_s): (f64, f64), foot: &mut FootContact) -> bool {
+        let is_late = self.time_s >= start_s + LANDING * (end_s - start_s);
+        let strikes = is_late && foot.take_heel_strike();
+        if strikes {
+            self.time_s = planned_s;
+        }
+        strikes
+    }
+
     /// Advances by `period_s`, at most to `end_s`.
     pub(super) fn advance(&mut self, period_s: f64, end_s: f64, phase: Option<StridePhase>) {
         let correction = phase.filter(|phase| phase.planned_rate.abs() >= phase.slowest).map_or(0.0, |phase| {
@@ -92,6 +108,19 @@ mod tests {
         assert!((run(0.8, 0.1) - 0.8).abs() < 0.01);
         assert!((run(1.2, 0.1) - 1.2).abs() < 0.01);
         assert!((run(1.2, 1.1) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn heel_strike_restarts_the_clock_in_the_second_half_of_swing_only() {
+        let mut foot = FootContact::new(false);
+        foot.update(500.0);
+        let mut clock = StrideClock { time_s: 0.7 };
+        assert!(!clock.restart_at(0.0, (0.5, 1.0), &mut foot) && clock.time_s == 0.7);
+        clock.time_s = 0.8;
+        assert!(clock.restart_at(0.0, (0.5, 1.0), &mut foot) && clock.time_s == 0.0);
+        // The foot stays on the ground.
+        clock.time_s = 0.9;
+        assert!(!clock.restart_at(0.0, (0.5, 1.0), &mut foot) && clock.time_s == 0.9);
     }
 
     #[test]

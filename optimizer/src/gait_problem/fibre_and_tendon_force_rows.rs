@@ -7,7 +7,7 @@ use super::layout::{DomainLayout, PointVariables, Q, U};
 use super::program_data::GaitProgram;
 use super::rows::PointRows;
 use super::sparse_entries::Entries;
-use crate::muscle::unit::AttachmentValue;
+use crate::muscle::attachment::AttachmentValue;
 use crate::muscle::{CurveValue, MUSCLE_COUNT, Muscle, force_length, force_velocity, tendon_force};
 
 const TORQUE_SCALE: f64 = 1.0 / 100.0;

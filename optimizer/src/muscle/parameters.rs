@@ -1,6 +1,7 @@
 //! Muscle parameters of a subject: the published table, scaled to the subject or overridden by measured values.
 
-use super::unit::{Joint, MUSCLE_COUNT, MUSCLES, Muscle};
+use super::attachment::Joint;
+use super::unit::{MUSCLE_COUNT, MUSCLES, Muscle};
 use crate::model_error::ModelError;
 use crate::subject::Subject;
 use serde::{Deserialize, Serialize};

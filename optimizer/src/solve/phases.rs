@@ -5,6 +5,7 @@ use super::error::SolveError;
 use super::options::SolveOptions;
 use super::progress::{IterationRecord, SolvePhase};
 use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra};
+use super::time_limit;
 use crate::cancel_token::CancelToken;
 use crate::gait_problem::{GaitProblem, GaitProgram};
 use crate::initial_guess;
@@ -95,15 +96,12 @@ impl<'a> RunInProgress<'a> {
         settings: &NlpSettings,
     ) -> Result<NlpResult, SolveError> {
         let options = self.context.options;
-        let remaining = options
-            .time_limit_s
-            .map_or(f64::INFINITY, |limit| (limit - self.context.started.elapsed().as_secs_f64()).max(0.0));
         let most = match phase {
             SolvePhase::Tracking | SolvePhase::MuscleTracking => MOST_TRACKING_ITERATIONS,
             SolvePhase::PlainCost | SolvePhase::Cost | SolvePhase::InterNode => usize::MAX,
         };
         let settings = NlpSettings {
-            max_seconds: remaining,
+            max_seconds: time_limit::remaining_s(options, self.context.started),
             max_iterations: options.max_iterations.min(most),
             threads: self.threads,
             ..*settings

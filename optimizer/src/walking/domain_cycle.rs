@@ -60,25 +60,6 @@ pub const CYCLE: [Domain; 8] = {
     ]
 };
 
-impl Side {
-    /// The other leg.
-    #[must_use]
-    pub const fn other(self) -> Self {
-        match self {
-            Self::Left => Self::Right,
-            Self::Right => Self::Left,
-        }
-    }
-
-    /// Index in q of the hip angle of this leg; knee and ankle follow.
-    pub const fn hip(self) -> usize {
-        match self {
-            Self::Left => 3,
-            Self::Right => 6,
-        }
-    }
-}
-
 impl Domain {
     /// Name: `DS2_R`, ...
     pub fn name(self) -> &'static str {

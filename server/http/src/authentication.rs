@@ -16,11 +16,6 @@ use gaitwright_store::{Instant, commit};
 /// Name of the session cookie.
 const COOKIE: &str = "gaitwright_session";
 
-/// Name of the cookie that outlives a session. It grants no access: the sign-in back-off uses it to recognise a browser
-/// in which the user signed in earlier.
-const BROWSER: &str = "gaitwright_browser";
-const BROWSER_SECONDS: u32 = 365 * 24 * 3600;
-
 /// Receives the request, adds its [`Caller`], and the caller's role to the response. Refuses an invalid token; ignores an
 /// invalid session. The caller is looked up again after a body was received, because rights can end while it arrives.
 pub(super) async fn identify(State(app): State<AppState>, request: Request, next: Next) -> Result<Response, Refusal> {
@@ -135,11 +130,6 @@ pub(super) fn session_of(headers: &HeaderMap) -> Option<&str> {
     cookie_in(headers, COOKIE)
 }
 
-/// The secret that identifies a browser after sign-out.
-pub(super) fn browser_of(headers: &HeaderMap) -> Option<&str> {
-    cookie_in(headers, BROWSER)
-}
-
 /// The value of a cookie.
 pub(super) fn cookie_in<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
     let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
@@ -155,12 +145,5 @@ pub(super) fn cookie(session: Option<&str>, secure: bool) -> Result<HeaderValue,
         Some(secret) => format!("{COOKIE}={secret}; Path=/; HttpOnly; SameSite=Lax{secure}"),
         None => format!("{COOKIE}=; Path=/; HttpOnly; SameSite=Lax; Max-Age=0{secure}"),
     };
-    HeaderValue::from_str(&text).map_err(|e| Error::Internal(e.to_string()))
-}
-
-/// The Set-Cookie header that identifies a browser after sign-out.
-pub(super) fn browser_cookie(browser: &str, secure: bool) -> Result<HeaderValue, Error> {
-    let secure = if secure { "; Secure" } else { "" };
-    let text = format!("{BROWSER}={browser}; Path=/; HttpOnly; SameSite=Lax; Max-Age={BROWSER_SECONDS}{secure}");
     HeaderValue::from_str(&text).map_err(|e| Error::Internal(e.to_string()))
 }

@@ -10,6 +10,7 @@ pub mod access;
 pub mod backups;
 pub mod dispatch_error;
 pub mod error;
+pub mod expired_data;
 pub mod job;
 pub mod json_document;
 pub mod printable;

@@ -6,8 +6,8 @@ use super::output::{data, tell};
 use super::settings::{AnchoredFlags, Settings};
 use clap::Args;
 use gaitwright_service::error::Error;
+use gaitwright_service::expired_data::{self, DeletedCounts};
 use gaitwright_service::studies::pruning::prune;
-use gaitwright_service::studies::retention::{self, DeletedCounts};
 
 #[derive(Debug, Args)]
 pub(super) struct PruneCommand {
@@ -25,7 +25,7 @@ impl PruneCommand {
         exists(&settings.database())?;
         let mut store = settings.open_record().await?;
         let done = prune(&mut store, self.older_than_days).await;
-        let expired = retention::delete_expired(&store).await;
+        let expired = expired_data::delete_expired(&store).await;
         store.close().await;
         let (DeletedCounts { answers, sessions, links }, trajectories) = (expired?, done?);
         let (keys, sessions) = (count(answers, "idempotency key"), count(sessions, "session"));

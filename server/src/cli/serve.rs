@@ -14,9 +14,9 @@ use gaitwright_http::{AccessState, AppState, Hosts, is_loopback_name, router};
 use gaitwright_service::access::user_administration;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
+use gaitwright_service::expired_data;
 use gaitwright_service::scheduled_backups::ClaimedPlan;
 use gaitwright_service::studies::built_in_entries;
-use gaitwright_service::studies::retention;
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess};
 #[cfg(feature = "nats")]
@@ -185,7 +185,7 @@ async fn run_maintenance(
     backups: Option<ClaimedPlan>,
 ) {
     let dropping =
-        scheduler.keep("deleting expired data", |task| retention::delete_expired_hourly(store.clone(), task));
+        scheduler.keep("deleting expired data", |task| expired_data::delete_expired_hourly(store.clone(), task));
     let pruning = async {
         if let Some(days) = access_log_days {
             scheduler.keep("pruning the access log", |task| keep_pruning(store.clone(), days, task)).await;

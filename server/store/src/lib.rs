@@ -52,10 +52,10 @@ pub mod measurement_files;
 pub mod members;
 mod migrations;
 mod opening_checks;
-mod ownership;
 pub mod quarantine;
 pub mod read_only;
 mod record_file_names;
+mod record_lock;
 pub mod reference_gaits;
 pub mod restore;
 pub mod rights;
@@ -98,8 +98,8 @@ pub use writer::Writer;
 use anchor::Anchors;
 use gaitwright_compute::{ComputeError, OnPool, Pool};
 use lost_files::RecordFiles;
-use opening_checks::{check_history, refuse_empty_in_place_of_record, refuse_unchanged};
-use ownership::Ownership;
+use opening_checks::{check_history, refuse_empty_in_place_of_record, refuse_unchanged, verify_and_migrate};
+use record_lock::RecordLock;
 use sqlx::ConnectOptions as _;
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
@@ -152,7 +152,7 @@ pub struct Store {
     probed: Arc<Mutex<Option<Probe>>>,
     /// Held until the record is closed or the last clone is dropped, so that no other process can open the file for
     /// writing.
-    owner: Arc<Mutex<Option<Ownership>>>,
+    record_lock: Arc<Mutex<Option<RecordLock>>>,
 }
 
 impl Store {
@@ -176,24 +176,24 @@ impl Store {
         sqlite_file::check(path)?;
         let anchors: Vec<PathBuf> =
             [Some(anchor::path_of(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
-        let mut owner = Ownership::take(path)?;
+        let mut record_lock = RecordLock::take(path)?;
         let checked = async {
             interrupted_restore::finish_interrupted(path)?;
             refuse_unchanged(path).await?;
             refuse_empty_in_place_of_record(path, &anchors)?;
-            owner.make_database(path)
+            record_lock.make_database(path)
         };
         if let Err(error) = checked.await {
             let error = sqlite_file::named(path, error);
             if error.is_wrong_file() {
-                owner.withdraw();
+                record_lock.withdraw();
             }
             return Err(error);
         }
         let opened = Self::open_owned(path, anchors).await.map_err(|error| sqlite_file::named(path, error));
         match &opened {
-            Ok(store) => *store.owner.lock().await = Some(owner),
-            Err(error) if error.is_wrong_file() => owner.withdraw(),
+            Ok(store) => *store.record_lock.lock().await = Some(record_lock),
+            Err(error) if error.is_wrong_file() => record_lock.withdraw(),
             Err(_) => {}
         }
         opened
@@ -221,7 +221,7 @@ impl Store {
             return Err(refused);
         }
         let version = second_writer::data_version(&mut *only.acquire().await?).await?;
-        migrations::apply(&only, path).await?;
+        verify_and_migrate(&only, path, schema_versions::FILES).await?;
         if let Some(newest) = audit::newest(&mut *only.acquire().await?).await? {
             time::never_before(newest);
         }
@@ -250,7 +250,7 @@ impl Store {
             copying: Arc::default(),
             pool: Pool::default(),
             probed: Arc::default(),
-            owner: Arc::default(),
+            record_lock: Arc::default(),
         };
         commit(store.write().await?).await?;
         Ok(store)
@@ -354,7 +354,7 @@ impl Store {
     pub async fn close(&self) {
         self.readers.close().await;
         self.writing.close().await;
-        drop(self.owner.lock().await.take());
+        drop(self.record_lock.lock().await.take());
     }
 }
 

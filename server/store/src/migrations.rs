@@ -1,44 +1,26 @@
-//! Migrates a record at start, in one transaction, after a backup.
+//! The steps of a migration: a backup before it, and the migrations with seals for the rows that they write.
 
 use super::record_file_names::path_with_suffix;
-use super::schema_versions::{FILES, SchemaFile, check_version, migrator};
+use super::schema_versions::{SchemaFile, migrator};
 use super::verified_copy::whole_copy;
-use super::{StoreError, StoreResult, seals, verify};
+use super::{Connection, StoreError, StoreResult, seals};
 use sqlx::SqlitePool;
 use std::path::{Path, PathBuf};
 
 /// Length of the header of an SQLite file.
 const SQLITE_HEADER_BYTES: usize = 100;
 
-/// Verifies a record, migrates it, and seals the rows that the migrations wrote, in one transaction. Refuses a record
-/// that another program changed, and leaves it unchanged.
-pub(super) async fn apply(pool: &SqlitePool, path: &Path) -> StoreResult<()> {
-    migrate(pool, path, FILES).await
-}
-
-/// As [`apply`], with these migrations.
-async fn migrate(pool: &SqlitePool, path: &Path, files: &[SchemaFile]) -> StoreResult<()> {
-    let found = check_version(pool, path).await?;
-    let is_newest = files.iter().all(|(version, ..)| *version <= found);
-    if found > 0 && !is_newest {
-        back_up_before(pool, path, found).await?;
-    }
-    let mut change = pool.begin().await?;
-    if found > 0 {
-        verify::rows(&mut change, found).await?;
-    }
-    if !is_newest {
-        let before = seals::present(&mut change).await?;
-        seals::watch_migrations(&mut change).await?;
-        migrator(files).run_direct(None, &mut *change, false).await?;
-        seals::adopt(&mut change, &before).await?;
-        seals::end_watch(&mut change).await?;
-    }
-    Ok(change.commit().await?)
+/// Migrates a record, and seals the rows that the migrations wrote.
+pub(super) async fn apply(db: &mut Connection, files: &[SchemaFile]) -> StoreResult<()> {
+    let before = seals::present(db).await?;
+    seals::watch_migrations(db).await?;
+    migrator(files).run_direct(None, &mut *db, false).await?;
+    seals::adopt(db, &before).await?;
+    seals::end_watch(db).await
 }
 
 /// Backs up a file before a migration, as `gaitwright.db.v1`.
-async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
+pub(super) async fn back_up_before(pool: &SqlitePool, path: &Path, found: i64) -> StoreResult<()> {
     let name = path_with_suffix(path, &format!(".v{found}"));
     let cannot_write = |source| StoreError::Open { path: name.clone(), source };
     let copy = whole_copy(pool, path, &name, path).await?;
@@ -68,8 +50,9 @@ fn free_name(name: &Path, part: &Path) -> std::io::Result<Option<PathBuf>> {
 #[cfg(test)]
 mod tests {
     use super::super::audit::Actor;
-    use super::super::schema_versions::SCHEMA_VERSION;
-    use super::super::{Store, commit, consents, read_only, subjects};
+    use super::super::opening_checks::verify_and_migrate;
+    use super::super::schema_versions::{FILES, SCHEMA_VERSION};
+    use super::super::{Store, commit, consents, read_only, subjects, verify};
     use super::*;
     use std::ops::AddAssign;
     use tempfile::TempDir;
@@ -125,7 +108,7 @@ mod tests {
         let kept = path_with_suffix(&database, &format!(".v{SCHEMA_VERSION}"));
         for _ in 0..2 {
             let migrated = pool(&database).await;
-            migrate(&migrated, &database, &with_next(NEXT)).await.unwrap();
+            verify_and_migrate(&migrated, &database, &with_next(NEXT)).await.unwrap();
             let mut db = migrated.acquire().await.unwrap();
             let next: String = sqlx::query_scalar("select next from subjects").fetch_one(&mut *db).await.unwrap();
             assert_eq!(next, "x");
@@ -162,7 +145,7 @@ mod tests {
     async fn child_migrates_the_record_that_it_is_given() {
         let Some(database) = std::env::var_os(CHILD).map(PathBuf::from) else { return };
         let migrated = pool(&database).await;
-        migrate(&migrated, &database, &with_next(LARGE)).await.unwrap();
+        verify_and_migrate(&migrated, &database, &with_next(LARGE)).await.unwrap();
         migrated.close().await;
     }
 
@@ -235,7 +218,7 @@ mod tests {
             }
             // The next start completes the migration.
             if !is_new {
-                migrate(&opened, &database, &with_next(LARGE)).await.unwrap();
+                verify_and_migrate(&opened, &database, &with_next(LARGE)).await.unwrap();
             }
             let mut db = opened.acquire().await.unwrap();
             let sealed = seals::verify(&mut db).await.unwrap();
@@ -254,7 +237,7 @@ mod tests {
         let (_folder, database) = record().await;
         let pool = pool(&database).await;
         let failing = "update subjects set notes = 'x'; insert into no_such_table values (1);";
-        let failed = migrate(&pool, &database, &with_next(failing)).await;
+        let failed = verify_and_migrate(&pool, &database, &with_next(failing)).await;
         assert!(matches!(failed, Err(StoreError::Migrate(_))), "{failed:?}");
         pool.close().await;
         assert_eq!(versions(&database).await.last(), Some(&SCHEMA_VERSION));
@@ -272,7 +255,7 @@ mod tests {
         let forged = "insert into consents (subject_id, kind, note, actor, created_at) \
                       select id, 'given', 'x', 'x', '' from subjects";
         sqlx::query(forged).execute(&pool).await.unwrap();
-        let refused = migrate(&pool, &database, &with_next(NEXT)).await;
+        let refused = verify_and_migrate(&pool, &database, &with_next(NEXT)).await;
         let Err(StoreError::Unverified { reason, .. }) = &refused else { panic!("{refused:?}") };
         assert!(reason.contains("row 2 of consents has no seal"), "{reason}");
         pool.close().await;

@@ -1,8 +1,9 @@
 //! Checks of a file before it is opened as a record: not another program's, not an earlier state, not an empty file in
-//! place of a record.
+//! place of a record, and every row verified.
 
 use super::record_file_names::path_with_suffix;
-use super::{StoreError, StoreResult, anchor, schema_versions};
+use super::schema_versions::SchemaFile;
+use super::{StoreError, StoreResult, anchor, migrations, schema_versions, verify};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::{Path, PathBuf};
@@ -51,6 +52,24 @@ pub(super) async fn check_history(pool: &SqlitePool, path: &Path, anchors: &[Pat
         anchor::check(&mut *pool.acquire().await?, path, anchor).await?;
     }
     Ok(())
+}
+
+/// Verifies a record and migrates it, in one transaction, after a backup. Refuses a record that another program changed, and
+/// leaves it unchanged.
+pub(super) async fn verify_and_migrate(pool: &SqlitePool, path: &Path, files: &[SchemaFile]) -> StoreResult<()> {
+    let found = schema_versions::check_version(pool, path).await?;
+    let is_newest = files.iter().all(|(version, ..)| *version <= found);
+    if found > 0 && !is_newest {
+        migrations::back_up_before(pool, path, found).await?;
+    }
+    let mut change = pool.begin().await?;
+    if found > 0 {
+        verify::rows(&mut change, found).await?;
+    }
+    if !is_newest {
+        migrations::apply(&mut change, files).await?;
+    }
+    Ok(change.commit().await?)
 }
 
 /// Refuses a file without a schema if an anchor shows that its log was lost.

@@ -6,9 +6,9 @@
 
 use super::atomic_file::WholeFile;
 use super::interrupted_restore::{COMPANIONS, Marker, RestoreStep, finish, finish_interrupted, hash_of, mark};
-use super::ownership::Ownership;
 use super::record_file_names::free_name;
 use super::record_file_names::path_with_suffix;
+use super::record_lock::RecordLock;
 use super::verified_copy::{self, whole_copy};
 use super::{StoreError, StoreResult, anchor, read_only};
 use std::fs::File;
@@ -33,7 +33,7 @@ async fn replace(
 ) -> StoreResult<Option<PathBuf>> {
     anchor::refuse_wrong(elsewhere, to, Some(from))?;
     read_only::check(from).await?;
-    let _owner = Ownership::take(to)?;
+    let _lock = RecordLock::take(to)?;
     finish_interrupted(to)?;
     let cannot_write = |source| StoreError::Open { path: to.to_owned(), source };
     // Copy through SQLite, because part of the backup may be in its log.

@@ -15,7 +15,7 @@ use gaitwright_service::studies::assessment::{self, NewAssessment};
 use gaitwright_service::studies::feedback_log::{self, CurrentAnswer};
 use gaitwright_service::studies::preference_answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::recorded_answer::RecordedAnswer;
-use gaitwright_service::studies::reported_gaits::SafetyReports;
+use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_store::assessments::AssessmentAnswer;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::idempotency::{self, StoredResponse, fingerprint};

@@ -25,7 +25,8 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
 use gaitwright_service::studies::relaxed_trial::NoRelaxedTrial;
-use gaitwright_service::studies::reported_gaits::{ReportedGait, SafetyReports};
+use gaitwright_service::studies::reported_gait::ReportedGait;
+use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};
@@ -123,7 +124,7 @@ pub(super) async fn get(
         None => None,
     };
     let reports = SafetyReports::read(&mut reader, study.id).await?;
-    let elsewhere = reports.about_motion_of(&trial).and_then(|report| report.other_trial(&trial));
+    let elsewhere = reports.unsafe_motions.about(&trial).and_then(|report| report.other_trial(&trial));
     let unsafe_elsewhere =
         elsewhere.map(|other| format!("The same gait was reported as unsafe in {other}. Do not walk with it."));
     let SafetyReports { in_force: mut unsafe_by, mut cleared, .. } = reports;

@@ -37,7 +37,8 @@ const OFFERED: u32 = 200;
 #[template(path = "lab_sessions.html")]
 struct SessionsPage {
     study: Study,
-    sessions: Vec<(LabSessionView, String)>,
+    /// The sessions, with name in the lab and state.
+    sessions: Vec<(LabSessionView, String, String)>,
     /// Different walkable gaits of the study, lowest Gait RMSE first, with their labels.
     gaits: Vec<(TrialId, String)>,
     may_run: bool,
@@ -97,8 +98,8 @@ async fn show_list(
     };
     let shown = |session| {
         let view = LabSessionView::from(&session);
-        let state = words(view.state.as_str());
-        (view, state)
+        let (name_in_lab, state) = (lab::name_in_lab(view.id), words(view.state.as_str()));
+        (view, name_in_lab, state)
     };
     page(&SessionsPage {
         study,
@@ -141,6 +142,7 @@ pub(super) async fn plan(
 #[template(path = "lab_session.html")]
 struct SessionPage {
     study: Study,
+    name_in_lab: String,
     state: String,
     gaits: [NumberedTrial; 2],
     walks: Vec<WalkRow>,
@@ -285,6 +287,7 @@ pub(super) async fn show(
     let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
     page(&SessionPage {
         study,
+        name_in_lab: lab::name_in_lab(session.id),
         state: words(session.state.as_str()),
         gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
         walks: session

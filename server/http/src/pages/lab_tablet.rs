@@ -25,8 +25,8 @@ const LISTED_SECONDS: i64 = 7 * 86_400;
 #[derive(Template)]
 #[template(path = "lab.html")]
 struct LabPage {
-    /// Open sessions with time of planning and next step, without the study's name, which could reveal what is tuned.
-    sessions: Vec<(LabSessionId, Instant, String)>,
+    /// Open sessions with name, time of planning and next step, without the study's name, which could reveal what is tuned.
+    sessions: Vec<(LabSessionId, String, Instant, String)>,
     /// Whether the caller can see any study.
     assigned: bool,
     /// Whether the caller may see studies, so that the page has the navigation.
@@ -77,7 +77,7 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
             (None, Some(_)) => "all walks recorded, answer pending".to_owned(),
             (None, None) => "all walks recorded, answer saved".to_owned(),
         };
-        sessions.push((session.id, session.created_at, next));
+        sessions.push((session.id, lab::name_in_lab(session.id), session.created_at, next));
     }
     let assigned = accessible_studies::reaches_any(&mut reader, authorized.caller.reach()).await?;
     let staff = authorized.caller.may(Read::NEEDED);
@@ -96,7 +96,7 @@ pub(super) async fn get(
 async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> PageResult {
     let seen = lab::session_progress(&mut *app.read().await?, id).await?;
     let answer_in_words = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
-    page(&WalkPage { name: id.short(), answer_in_words, seen, refused, typed })
+    page(&WalkPage { name: lab::name_in_lab(id), answer_in_words, seen, refused, typed })
 }
 
 /// `POST /lab/{id}`.

@@ -1,11 +1,12 @@
 //! Signing in and out, and the user's own account.
 
 use super::unsent_form::{SignInPage, Unsent, send_now};
-use crate::authentication::{browser_cookie, browser_of, cookie, session_of};
+use crate::authentication::{cookie, session_of};
 use crate::authorization::{SignedIn, not_signed_in};
 use crate::extractors::Form;
 use crate::form_errors;
 use crate::format;
+use crate::known_browser::{self, BrowserSecret};
 use crate::page_error::{PageError, PageResult, page};
 use crate::{AppState, ClientAddress};
 use askama::Template;
@@ -66,29 +67,25 @@ struct Visit {
     /// The `User-Agent` header.
     browser: Option<String>,
     /// The secret of the browser's cookie.
-    kept: Option<String>,
+    kept: BrowserSecret,
 }
 
 impl Visit {
     fn of(address: ClientAddress, headers: &HeaderMap) -> Self {
         let browser = headers.get(header::USER_AGENT).and_then(|value| value.to_str().ok());
         let browser = browser.map(|text| text.chars().filter(|c| !c.is_control()).take(200).collect());
-        Self { address, browser, kept: browser_of(headers).map(str::to_owned) }
+        Self { address, browser, kept: BrowserSecret::of(headers) }
     }
 
     /// The origin of an attempt to sign in with a name.
     async fn origin(&self, writer: &mut Writer, user: Option<&User>) -> Result<Origin, Error> {
-        let known = match (&self.kept, user) {
-            (Some(kept), Some(user)) => sessions::is_known_browser(writer, user.id, &secret::hash(kept)).await?,
-            _ => false,
-        };
-        let known = user.filter(|_| known).map(|user| user.id);
+        let known = self.kept.recognised(writer, user).await?;
         Ok(Origin { network: self.address.network(), site: self.address.site(), known })
     }
 
     /// The secret of the browser's cookie, and the origin that a new session records.
     fn begins(&self) -> Result<(String, SignInOrigin), Error> {
-        let kept = self.kept.clone().map_or_else(secret::fresh, Ok)?;
+        let kept = self.kept.kept_or_fresh()?;
         let browser_hash = Some(secret::hash(&kept));
         let address = Some(self.address.to_string());
         Ok((kept, SignInOrigin { address, browser: self.browser.clone(), browser_hash }))
@@ -192,7 +189,7 @@ pub(super) async fn use_link(
 /// The cookies of a new session.
 fn cookies(app: &AppState, session: &str, kept: &str) -> Result<AppendHeaders<[(HeaderName, HeaderValue); 2]>, Error> {
     let secure = app.access.secure;
-    let (session, browser) = (cookie(Some(session), secure)?, browser_cookie(kept, secure)?);
+    let (session, browser) = (cookie(Some(session), secure)?, known_browser::cookie(kept, secure)?);
     Ok(AppendHeaders([(header::SET_COOKIE, session), (header::SET_COOKIE, browser)]))
 }
 

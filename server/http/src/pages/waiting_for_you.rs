@@ -2,7 +2,7 @@
 
 use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::{lifecycle, reported_gaits};
+use gaitwright_service::studies::{lifecycle, safety_reports};
 use gaitwright_store::Connection;
 use gaitwright_store::studies::{self, Study, StudyState};
 
@@ -16,7 +16,7 @@ pub(super) struct WaitingStudy {
 
 /// The studies that wait for someone, at most `most` for each reason.
 pub(super) async fn waiting_studies(db: &mut Connection, reach: Reach, most: u32) -> Result<Vec<WaitingStudy>, Error> {
-    let unsafe_gaits = reported_gaits::undecided(db, reach, most).await?.into_iter().map(unsafe_gaits);
+    let unsafe_gaits = safety_reports::undecided(db, reach, most).await?.into_iter().map(unsafe_gaits);
     let held = studies::waiting_for_people(db, reach, most).await?.into_iter().map(waiting);
     Ok(unsafe_gaits.chain(held).collect())
 }

@@ -11,7 +11,7 @@ pub(super) fn excluded_without_result(snapshot: &StudySnapshot) -> Vec<ActionInd
     let plan = &snapshot.study.plan;
     let open = snapshot.trials.iter().filter(|trial| !trial.state.is_result()).map(|trial| trial.action_index);
     let unsafe_bounds =
-        snapshot.grounds.safety_reports.reported_bounds().filter(|_| plan.evaluation == Evaluation::Script);
+        snapshot.grounds.safety_reports.unsafe_motions.bounds().filter(|_| plan.evaluation == Evaluation::Script);
     let unsafe_actions =
         unsafe_bounds.filter_map(|bounds| bound_grid::action_of(&plan.search_space, plan.base_bounds, bounds));
     open.chain(unsafe_actions).collect()

@@ -89,7 +89,8 @@ async fn report_unsafe(writer: &mut Writer, statement: AttributedAnswer<'_>) -> 
     if grounds.withdrawn {
         return Err(NotWalkable::Withdrawn.into());
     }
-    let neither_is_reported = [&first, &second].iter().all(|trial| !grounds.safety_reports.forbids(trial));
+    let neither_is_reported =
+        [&first, &second].iter().all(|trial| !grounds.safety_reports.unsafe_motions.include(trial));
     let preference = answer.feedback(pair).filter(|_| neither_is_reported && !is_same_gait(&first, &second));
     match preference {
         // The assessment itself names the answer that it replaces.

@@ -7,7 +7,7 @@ use super::analysis::Analyses;
 use super::feedback_log;
 use super::gait_rmse_answers::gait_rmse_answers;
 use super::lifecycle;
-use super::reported_gaits::SafetyReports;
+use super::safety_reports::SafetyReports;
 use super::snapshot::StudySnapshot;
 use super::trial_choice::{self, ChoiceError};
 use crate::access::Caller;
@@ -106,7 +106,7 @@ pub async fn suggest(
 pub async fn not_reported(db: &mut Connection, trial: TrialId) -> Result<(), Error> {
     let trial = trials::get(db, trial).await?;
     let reports = SafetyReports::read(db, trial.study_id).await?;
-    if reports.reported_bounds().any(|bounds| bounds == trial.action) {
+    if reports.unsafe_motions.bounds().any(|bounds| bounds == trial.action) {
         let number = trial.number;
         return Err(Error::conflict(format!(
             "A gait with the bounds of trial {number} was reported as unsafe. Cancel the trial, then ask again."

@@ -5,6 +5,7 @@ use super::automatic_pause::reason_to_pause;
 use super::lifecycle::StudyTransition;
 use super::pending_comparison::{self, PendingComparison};
 use super::snapshot::StudySnapshot;
+use super::stopping_rule::reason_to_stop;
 use super::trial_choice;
 use super::warm_start_choice;
 use crate::error::Error;
@@ -55,7 +56,7 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
         let finished = PlanningStep::Transition(StudyTransition::Finish, reason);
         return Ok(if open == 0 { finished } else { PlanningStep::Nothing });
     }
-    if let Some(reason) = snapshot.is_enough() {
+    if let Some(reason) = reason_to_stop(snapshot) {
         return Ok(if open == 0 {
             PlanningStep::Transition(StudyTransition::Finish, reason)
         } else {

@@ -10,7 +10,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 /// # Errors
 /// When a trial's action is not in the search space.
 pub fn ranking(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Vec<TrialId>, LearnerError> {
-    by_mean(snapshot, posterior, |trial| !snapshot.grounds.safety_reports.forbids(trial))
+    by_mean(snapshot, posterior, |trial| !snapshot.grounds.safety_reports.unsafe_motions.include(trial))
 }
 
 /// Converged trials by decreasing posterior mean; ties by number.

@@ -35,5 +35,6 @@ pub fn ranking_to_show(
 /// The trial that was best at the newest proposal, if its gait has no safety report in force. Needs only the newest trials.
 pub fn last_known_best(snapshot: &StudySnapshot) -> Option<TrialId> {
     let best = snapshot.trials.last().and_then(|newest| newest.best_before).and_then(|best| snapshot.trial(best))?;
-    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.forbids(best)).then_some(best.id)
+    (best.state == TrialState::Converged && !snapshot.grounds.safety_reports.unsafe_motions.include(best))
+        .then_some(best.id)
 }

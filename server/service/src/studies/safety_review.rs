@@ -1,6 +1,7 @@
 //! Records the decision of staff about a gait that was reported as unsafe, for pages and REST.
 
-use super::reported_gaits::{ReportedGait, SafetyReportSource, SafetyReports};
+use super::reported_gait::{ReportedGait, SafetyReportSource};
+use super::safety_reports::SafetyReports;
 use crate::access::Caller;
 use crate::error::Error;
 use crate::printable;
@@ -54,7 +55,7 @@ pub async fn give(
     let in_force = reports.in_force_about(id);
     let number = trial.number;
     if in_force.is_empty() {
-        let elsewhere = reports.about_motion_of(&trial).and_then(|report| report.other_trial(&trial));
+        let elsewhere = reports.unsafe_motions.about(&trial).and_then(|report| report.other_trial(&trial));
         return Err(Error::conflict(match elsewhere {
             Some(other) => {
                 format!("The gait of trial {number} was reported as unsafe in {other}. Review the report there.")

@@ -130,26 +130,6 @@ impl StudySnapshot {
         self.trials.iter().filter(|trial| trial.state.is_open()).count()
     }
 
-    /// The stopping rule that applies before the trials are used up: the time limit, or an unchanged best action.
-    pub fn is_enough(&self) -> Option<String> {
-        let plan = &self.study.plan;
-        let spent: f64 = self.trials.iter().filter_map(|trial| trial.seconds_total).sum();
-        if let Some(budget) = plan.solve_seconds_budget
-            && spent >= budget
-        {
-            return Some(format!("The solves took {spent:.0} s in total; the limit is {budget:.0} s."));
-        }
-        let limit = plan.unchanged_limit? as usize;
-        // The best trial at each proposal, newest first.
-        let bests: Vec<TrialId> =
-            self.trials.iter().rev().filter_map(|trial| trial.best_before).take(limit + 1).collect();
-        let same = bests.len() > limit && bests.iter().all(|best| *best == bests[0]);
-        same.then(|| match limit {
-            1 => "The last result did not change the best action.".to_owned(),
-            _ => format!("The best action has not changed over the last {limit} results."),
-        })
-    }
-
     /// The gait of a trial, if it is walkable.
     ///
     /// # Errors
@@ -166,8 +146,9 @@ impl StudySnapshot {
     /// Actions whose gaits Gait RMSE compares: converged, without a safety report in force. Nobody walks because of such a
     /// comparison, so it needs no certificate.
     pub fn comparable(&self) -> HashSet<ActionIndex> {
-        let shown =
-            |trial: &&Trial| trial.state == TrialState::Converged && !self.grounds.safety_reports.forbids(trial);
+        let shown = |trial: &&Trial| {
+            trial.state == TrialState::Converged && !self.grounds.safety_reports.unsafe_motions.include(trial)
+        };
         self.trials.iter().filter(shown).map(|trial| trial.action_index).collect()
     }
 

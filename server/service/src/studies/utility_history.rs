@@ -128,7 +128,7 @@ fn point(
     let gaits = snapshot.trials.iter().filter(|trial| {
         labelled.contains(&trial.id)
             && trial.state == TrialState::Converged
-            && !snapshot.grounds.safety_reports.forbids(trial)
+            && !snapshot.grounds.safety_reports.unsafe_motions.include(trial)
     });
     let Some(best) = highest(gaits, &posterior)? else { return Ok(None) };
     Ok(Some(UtilityPoint { answers, trial: best.id, utility: posterior.predict(best.action_index)? }))

@@ -4,7 +4,7 @@
 //! comparison and recommendation takes one, so code that skips the rules does not compile.
 
 use super::identical_gaits::is_same_gait;
-use super::reported_gaits::SafetyReports;
+use super::safety_reports::SafetyReports;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
@@ -218,7 +218,7 @@ impl Grounds {
         if trial.state != TrialState::Converged {
             return Err(NotWalkable::NotConverged { number, state: trial.state });
         }
-        if let Some(report) = self.safety_reports.about_motion_of(trial) {
+        if let Some(report) = self.safety_reports.unsafe_motions.about(trial) {
             return Err(match report.other_trial(trial) {
                 None => NotWalkable::ReportedUnsafe { number, by: report.report.by.clone() },
                 Some(other) => NotWalkable::SameGaitReportedUnsafe { number, other, by: report.report.by.clone() },

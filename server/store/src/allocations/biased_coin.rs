@@ -1,10 +1,11 @@
 //! Draws of allocations: biased coins for lab sessions (Efron 1971) and fair coins for pairs, as pure functions of a
-//! random draw.
+//! random draw and, for sessions, of the lead of one order over the other.
 //!
 //! Only unblinded allocations bias the coin of a session. A concealed one thus says nothing about any other, and nobody
 //! who sees everything else guesses it with a probability above [`BIAS`], whatever the order of planning and unblinding.
 
-use crate::{StoreError, StoreResult};
+use crate::{Connection, StoreError, StoreResult};
+use sqlx::Row;
 
 /// Random bytes for one allocation, from the operating system except in tests.
 #[derive(Debug, Clone, Copy)]
@@ -56,6 +57,19 @@ impl RandomDraw {
         let evens_out = self.number % 4 < BIAS;
         evens_out == (lead < 0)
     }
+}
+
+/// The number of unblinded sessions with this number in which gait A came first, less those in which gait B did. A
+/// concealed allocation does not count, because later ones would reveal it once they are unblinded. Nor does an
+/// imported one, which another service balanced.
+pub(super) async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
+    let row = sqlx::query(
+        "select coalesce(sum(2 * a.gait_a_first - 1), 0) from lab_sessions l \
+         join lab_session_steps t on t.lab_session_id = l.id and t.step = 'unblinded' \
+         join lab_allocations a on a.lab_session_id = l.id \
+         where l.number = ? and l.study_id not in (select study_id from imports)",
+    );
+    Ok(row.bind(number).fetch_one(db).await?.try_get(0)?)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Allocations: which gait comes first in a lab session or in a rater's pair.
 //!
-//! No other module reads these tables. Every statement that returns an allocation states in its `where` why it may be
-//! known: the session or the rater is unblinded, the pair belongs to the rater, or the device fetches its file, which
-//! is recorded. The draw reads unblinded ones.
+//! No module outside this folder reads these tables. Every statement that returns an allocation states in its `where` why
+//! it may be known: the session or the rater is unblinded, the pair belongs to the rater, or the device fetches its file,
+//! which is recorded. The draw reads unblinded ones.
 
 mod biased_coin;
 
@@ -26,7 +26,7 @@ pub async fn of_session(
     number: u32,
     random: RandomDraw,
 ) -> StoreResult<()> {
-    let gait_a_first = random.gait_a_first(lead(db, number).await?);
+    let gait_a_first = random.gait_a_first(biased_coin::lead(db, number).await?);
     sqlx::query("insert into lab_allocations (lab_session_id, gait_a_first, nonce, created_at) values (?, ?, ?, ?)")
         .bind(session)
         .bind(gait_a_first)
@@ -35,19 +35,6 @@ pub async fn of_session(
         .execute(db)
         .await?;
     Ok(())
-}
-
-/// The number of unblinded sessions with this number in which gait A came first, less those in which gait B did. A
-/// concealed allocation does not count, because later ones would reveal it once they are unblinded. Nor does an
-/// imported one, which another service balanced.
-async fn lead(db: &mut Connection, number: u32) -> StoreResult<i64> {
-    let row = sqlx::query(
-        "select coalesce(sum(2 * a.gait_a_first - 1), 0) from lab_sessions l \
-         join lab_session_steps t on t.lab_session_id = l.id and t.step = 'unblinded' \
-         join lab_allocations a on a.lab_session_id = l.id \
-         where l.number = ? and l.study_id not in (select study_id from imports)",
-    );
-    Ok(row.bind(number).fetch_one(db).await?.try_get(0)?)
 }
 
 /// What may be known of the allocation of a session.

@@ -1,7 +1,7 @@
 //! The answers of people on the study page.
 
 use crate::format;
-use gaitwright_service::studies::reported_gaits::{ReportedGait, SafetyReportSource};
+use gaitwright_service::studies::reported_gait::{ReportedGait, SafetyReportSource};
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::assessments::{Assessment, AssessmentAnswer};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Retraction, Source};

@@ -23,7 +23,7 @@ use gaitwright_service::studies::analysis::{Analyses, too_large_to_wait};
 use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};
 use gaitwright_service::studies::execution;
 use gaitwright_service::studies::lifecycle::{self, StudyTransition, transitions_for_people};
-use gaitwright_service::studies::reported_gaits::ReportedGait;
+use gaitwright_service::studies::reported_gait::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::workers::Track;
 use gaitwright_store::studies::{AnswerSource, Study, StudyState};

@@ -9,7 +9,7 @@ use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use crate::studies::new_safety_report;
 use crate::studies::pending_comparison::pending_comparison;
 use crate::studies::preference_answer as answering;
-use crate::studies::reported_gaits::SafetyReports;
+use crate::studies::safety_reports::SafetyReports;
 use crate::studies::snapshot::StudySnapshot;
 use crate::studies::walkable;
 use gaitwright_store::allocations::{self, PairWithSides, RandomDraw};
@@ -140,7 +140,7 @@ async fn reported_among(
 ) -> Result<Vec<TrialId>, Error> {
     let mut reported = Vec::new();
     for trial in pairs.flat_map(|(a, b)| [a, b]).collect::<BTreeSet<_>>() {
-        if safety_reports.forbids(&trials::get(db, trial).await?) {
+        if safety_reports.unsafe_motions.include(&trials::get(db, trial).await?) {
             reported.push(trial);
         }
     }

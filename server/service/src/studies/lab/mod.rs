@@ -14,6 +14,7 @@ mod measurement_results;
 mod question;
 mod rejected_strides;
 mod session;
+mod session_name;
 mod session_view;
 mod subject_answer;
 mod unblinding;
@@ -34,6 +35,7 @@ pub use session::{
     LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, gaits_to_plan_with, gaits_to_walk_with, plan,
     record_walk, session_progress, still_open, was_recorded,
 };
+pub use session_name::name_in_lab;
 pub use session_view::{LabSessionState, LabSessionView, WalkCondition, WalkView};
 pub use subject_answer::{NewAnswer, give as answer, retract};
 pub use unblinding::unblind;

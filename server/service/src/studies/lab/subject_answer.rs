@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::printable;
 use crate::studies::new_safety_report;
 use crate::studies::preference_answer as answering;
-use crate::studies::reported_gaits::SafetyReports;
+use crate::studies::safety_reports::SafetyReports;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{Attribution, Source};
 use gaitwright_store::lab_answers::{self, LabAnswer};

@@ -1,7 +1,7 @@
 //! The engine of the service for remote workers: publishes jobs, receives heartbeats and results.
 
 use super::broker_connection::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRES, unreachable};
-use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
+use super::message::{ResultMessage, Sign, SolveOrder, pack, unpack};
 use crate::dispatch_error::DispatchError;
 use crate::workers::Assignment;
 use crate::workers::dispatch::{Dispatch, EngineMessage, Receipt};
@@ -82,7 +82,7 @@ impl JetStream {
 
     async fn publish(&self, assignment: Assignment) -> Result<(), DispatchError> {
         let subject = self.link.job_subject(assignment.attempt);
-        let order = SolveOrder { program: PROGRAM.to_owned(), assignment };
+        let order = SolveOrder::from_this_version(assignment);
         let bytes = self.pool.run(move |_| pack(&order)).await.map_err(unreachable)??;
         self.link.fits("A job", &bytes)?;
         let jobs = self.link.jobs().await?;

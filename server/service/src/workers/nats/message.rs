@@ -13,9 +13,6 @@ const LARGEST_BYTES: u64 = 256 << 20;
 /// zstd level. Speed matters more than size on a local network.
 const COMPRESSION: i32 = 3;
 
-/// Version of the program. Another version may give different bits.
-pub(super) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-
 /// A job.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolveOrder {

@@ -8,6 +8,7 @@
 mod broker_connection;
 mod engine;
 mod message;
+mod same_version;
 mod worker;
 
 pub use broker_connection::reach;

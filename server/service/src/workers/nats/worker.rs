@@ -1,7 +1,8 @@
 //! The remote worker: pulls jobs from the broker, solves them on its own threads, and publishes heartbeats and results.
 
 use super::broker_connection::{AGAIN, BrokerConnection, unreachable};
-use super::message::{PROGRAM, ResultMessage, Sign, SolveOrder, pack, unpack};
+use super::message::{ResultMessage, Sign, SolveOrder, pack, unpack};
+use super::same_version::PROGRAM;
 use crate::dispatch_error::DispatchError;
 use crate::workers::dispatch::{AssignmentResult, Attempt, Dispatch, EngineMessage};
 use crate::workers::{Evaluate, InProcess};
@@ -147,7 +148,7 @@ impl Worker {
                 return answer(&acker, AckKind::Term).await;
             }
         };
-        if order.program != PROGRAM {
+        if !order.is_of_this_version() {
             tracing::error!(
                 theirs = order.program,
                 ours = PROGRAM,

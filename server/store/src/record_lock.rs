@@ -1,5 +1,5 @@
-//! Exclusive ownership of the record by one process, through a lock file and a lock on the database file. The lock file
-//! stays while the database file is created or replaced; the second lock holds even if the lock file is deleted.
+//! The lock on the record: exclusive ownership by one process, through a lock file and a lock on the database file. The
+//! lock file stays while the database file is created or replaced; the second lock holds even if the lock file is deleted.
 
 use super::atomic_file::private;
 use super::error::{StoreError, StoreResult};
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// The locks of an open record.
 #[derive(Debug)]
-pub(super) struct Ownership {
+pub(super) struct RecordLock {
     lock: PathBuf,
     /// Whether the lock file was created by this process.
     made: bool,
@@ -19,7 +19,7 @@ pub(super) struct Ownership {
     database: Option<File>,
 }
 
-impl Ownership {
+impl RecordLock {
     /// Takes ownership of an existing or future record.
     pub(super) fn take(path: &Path) -> StoreResult<Self> {
         refuse_second_name(path)?;

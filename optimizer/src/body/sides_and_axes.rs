@@ -22,6 +22,25 @@ pub enum Side {
     Right,
 }
 
+impl Side {
+    /// The other leg.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+
+    /// Index in q of the hip angle of this leg; knee and ankle follow.
+    pub const fn hip(self) -> usize {
+        match self {
+            Self::Left => 3,
+            Self::Right => 6,
+        }
+    }
+}
+
 /// A component in the sagittal plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

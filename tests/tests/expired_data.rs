@@ -4,7 +4,7 @@
 
 use axum::body::Body;
 use axum::http::{Request, header};
-use gaitwright_service::studies::retention::{DeletedCounts, delete_expired};
+use gaitwright_service::expired_data::{DeletedCounts, delete_expired};
 use gaitwright_store::audit;
 use gaitwright_store::seals::{self, SealCheck};
 use gaitwright_store::studies::StudyState;
