@@ -238,7 +238,7 @@ mod tests {
             (
                 "number=1&nmber=2",
                 "nmber",
-                "The query parameter nmber is unknown. Known parameters: number, share, order, contains.",
+                "The query parameter nmber is unknown. Known query parameters: number, share, order, contains.",
             ),
         ] {
             assert_eq!(refusal(query), (field.to_owned(), message.to_owned()));
