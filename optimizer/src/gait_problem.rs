@@ -2,12 +2,12 @@
 //!
 //! | constraint | rows here |
 //! |---|---|
-//! | C1 dynamics and contact | [`motion_and_contact_rows`], Hermite-Simpson of the zero dynamics in [`zero_dynamics_rows`] |
+//! | C1 dynamics and contact | [`motion_and_contact_rows`], Hermite-Simpson of the zero dynamics in [`zero_dynamics_collocation`] |
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity_rows`], [`transitions`] |
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], `joint_ranges`, [`stride`] |
 //! | C5-C7 muscle force equilibrium | [`fibre_and_tendon_force_rows`] |
-//! | C8 fibre kinematics | [`fibre_integration`] |
+//! | C8 fibre kinematics | [`fibre_collocation`] |
 //! | C9-C12 joint torques of the muscles | [`fibre_and_tendon_force_rows`] |
 
 pub(crate) mod active_constraint;
@@ -16,7 +16,7 @@ pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;
 pub mod fibre_and_tendon_force_rows;
-pub mod fibre_integration;
+pub mod fibre_collocation;
 pub mod foot_clearance;
 mod gait_of_variables;
 mod hermite_simpson;
@@ -38,7 +38,7 @@ pub mod transitions;
 pub(crate) mod unchanged_bounds;
 pub mod variable_bounds;
 pub mod virtual_constraint_rows;
-pub mod zero_dynamics_rows;
+pub mod zero_dynamics_collocation;
 
 pub use evaluation::RowViolation;
 pub use gait_of_variables::gait_of;

@@ -6,6 +6,7 @@ mod mean_stride;
 mod motion_recording;
 mod plausibility;
 mod recorded_strides;
+mod reference_from_recording;
 mod reference_gait;
 
 pub use crate::opensim::AngleUnit;

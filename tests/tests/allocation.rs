@@ -848,7 +848,7 @@ async fn anonymous_callers_cannot_see_running_solves() {
 fn only_allocation_modules_name_the_allocation_tables() {
     let allowed = [
         "allocations/mod.rs",
-        "allocations/biased_coin.rs",
+        "allocations/balanced_draws.rs",
         "archived_allocations.rs",
         "archived_rows.rs",
         "seals/tables.rs",

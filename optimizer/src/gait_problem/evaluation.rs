@@ -5,8 +5,8 @@ use super::elimination_tree::elimination_tree;
 use super::program_data::{GaitProgram, Structure};
 use super::sparse_entries::{Compressed, Entries};
 use super::{
-    contact_limits, fibre_and_tendon_force_rows, fibre_integration, hip_velocity_rows, motion_and_contact_rows,
-    objective, stride, transitions, virtual_constraint_rows, zero_dynamics_rows,
+    contact_limits, fibre_and_tendon_force_rows, fibre_collocation, hip_velocity_rows, motion_and_contact_rows,
+    objective, stride, transitions, virtual_constraint_rows, zero_dynamics_collocation,
 };
 use crate::body::PointState;
 use crate::body::dynamics::LinkHessian;
@@ -85,8 +85,8 @@ impl GaitProgram {
                 fibre_and_tendon_force_rows::jacobian(self, context.layout, point_rows, &point, p, out);
             }
             let context = self.domain_context(x, d);
-            zero_dynamics_rows::jacobian(self, &context, rows, x, out);
-            fibre_integration::jacobian(self, &context, rows, x, out);
+            zero_dynamics_collocation::jacobian(self, &context, rows, x, out);
+            fibre_collocation::jacobian(self, &context, rows, x, out);
             transitions::jacobian(self, d, rows, x, out);
         }
         stride::jacobian(self, x, out);
@@ -118,8 +118,8 @@ impl GaitProgram {
                 fibre_and_tendon_force_rows::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
             }
             let context = self.domain_context(x, d);
-            zero_dynamics_rows::hessian(&context, rows, multipliers, out);
-            fibre_integration::hessian(&context, rows, multipliers, out);
+            zero_dynamics_collocation::hessian(&context, rows, multipliers, out);
+            fibre_collocation::hessian(&context, rows, multipliers, out);
             transitions::hessian(self, d, rows, x, multipliers, out);
         }
         stride::hessian(self, x, multipliers, out);
@@ -197,8 +197,8 @@ impl NonlinearProgram for GaitProgram {
                 fibre_and_tendon_force_rows::values(self, point_rows, &point, values);
             }
             let context = self.domain_context(x, d);
-            zero_dynamics_rows::values(self, &context, rows, x, values);
-            fibre_integration::values(self, &context, rows, x, values);
+            zero_dynamics_collocation::values(self, &context, rows, x, values);
+            fibre_collocation::values(self, &context, rows, x, values);
             transitions::values(self, d, rows, x, values);
         }
         stride::values(self, x, values);

@@ -2,6 +2,9 @@
 
 use super::output::tell;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::StudyState;
+use gaitwright_store::trials::{Trial, TrialState};
 use std::process::ExitCode;
 
 /// Exit code for invalid input, as for every usage error.
@@ -29,6 +32,17 @@ impl CommandEnd {
             Self::Failed => ExitCode::FAILURE,
         }
     }
+}
+
+/// Why a study did not give every trial a result, which makes its command fail. A trial without a gait has a result.
+pub(super) fn without_result(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Option<String> {
+    let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
+    if study.state != StudyState::Finished {
+        return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
+    }
+    let last = trials.iter().rev().find(failed)?;
+    let count = trials.iter().filter(failed).count();
+    Some(format!("{count} of {} trials failed; the last one was trial {}: {}", trials.len(), last.number, last.message))
 }
 
 /// Reports an error. Returns the exit code of the command that it ended.

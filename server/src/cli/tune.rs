@@ -1,6 +1,6 @@
 //! `gaitwright tune`: runs an unattended study.
 
-use super::command_end::CommandEnd;
+use super::command_end::{self, CommandEnd};
 use super::cores::cores_or;
 use super::flag_choices::{WARM_STARTS, one_of};
 use super::flag_numbers::{seed, trials, workers};
@@ -105,7 +105,7 @@ impl TuneCommand {
             ));
             return Ok(CommandEnd::Interrupted);
         }
-        match unattended_study::failure(&ran.snapshot) {
+        match command_end::without_result(&ran.snapshot) {
             None => Ok(CommandEnd::Done),
             Some(failure) => {
                 tell(&format!("gaitwright: {failure}"));

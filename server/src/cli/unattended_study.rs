@@ -12,7 +12,7 @@ use gaitwright_service::studies::summary;
 use gaitwright_service::workers::{GaitSolver, InProcess};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::studies::{Study, StudyState};
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::Trial;
 use gaitwright_store::{Store, studies, trials as trial_rows};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
@@ -36,17 +36,6 @@ pub(super) struct Run {
     pub(super) interrupted: bool,
     /// The cached posteriors.
     pub(super) analyses: Arc<Analyses>,
-}
-
-/// The engineering failures of a study. A trial without a gait is a result, not a failure.
-pub(super) fn failure(StudySnapshot { study, trials, .. }: &StudySnapshot) -> Option<String> {
-    let failed = |trial: &&Trial| matches!(trial.state, TrialState::Failed | TrialState::Lost);
-    if study.state != StudyState::Finished {
-        return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
-    }
-    let last = trials.iter().rev().find(failed)?;
-    let count = trials.iter().filter(failed).count();
-    Some(format!("{count} of {} trials failed; the last one was trial {}: {}", trials.len(), last.number, last.message))
 }
 
 /// Runs a study until it ends or a person stops it.

@@ -4,7 +4,7 @@ mod report_page;
 mod statements;
 mod variants;
 
-use super::command_end::CommandEnd;
+use super::command_end::{self, CommandEnd};
 use super::flag_numbers::{seed, trials, whole};
 use super::out_file::OutFile;
 use super::output::{data, tell};
@@ -137,13 +137,14 @@ impl ReproduceCommand {
                             return Ok(None);
                         }
                         if ran.snapshot.study.state != StudyState::Finished {
-                            let why = unattended_study::failure(&ran.snapshot).unwrap_or_default();
+                            let why = command_end::without_result(&ran.snapshot).unwrap_or_default();
                             let why = why.trim_end_matches('.');
                             return Err(Error::Internal(format!("{title}: {why}. The comparison was stopped.")));
                         }
                         (ran.snapshot, ran.analyses)
                     };
-                    failures.extend(unattended_study::failure(&snapshot).map(|failure| format!("{title}: {failure}")));
+                    failures
+                        .extend(command_end::without_result(&snapshot).map(|failure| format!("{title}: {failure}")));
                     let certification = unattended_study::certified(store, &snapshot, &analyses).await?;
                     outcomes.push(
                         outcome(store, subject, muscles, seed, &snapshot, &analyses, certification, reference).await?,

@@ -4,9 +4,9 @@
 //! it may be known: the session or the rater is unblinded, the pair belongs to the rater, or the device fetches its file,
 //! which is recorded. The draw reads unblinded ones.
 
-mod biased_coin;
+mod balanced_draws;
 
-pub use biased_coin::RandomDraw;
+pub use balanced_draws::RandomDraw;
 
 use super::audit::Actor;
 use super::blind_pairs::{BlindPair, OrderedAnswer, SELECT};
@@ -26,7 +26,7 @@ pub async fn of_session(
     number: u32,
     random: RandomDraw,
 ) -> StoreResult<()> {
-    let gait_a_first = random.gait_a_first(biased_coin::lead(db, number).await?);
+    let gait_a_first = random.gait_a_first(balanced_draws::lead(db, number).await?);
     sqlx::query("insert into lab_allocations (lab_session_id, gait_a_first, nonce, created_at) values (?, ?, ?, ?)")
         .bind(session)
         .bind(gait_a_first)
