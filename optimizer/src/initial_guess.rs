@@ -7,21 +7,22 @@
 //! No step fails: if bounds make a QP infeasible, its constraints are relaxed, and the gait problem decides whether a
 //! gait exists.
 
+use crate::gait_problem::GaitProgram;
+
+pub mod guess_settings;
 pub mod guessed_motion;
 pub mod guessed_muscles;
 pub mod posture;
 
-/// Stride time and length of an initial guess.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GuessSettings {
-    /// Stride time, s.
-    pub stride_time_s: f64,
-    /// Stride length, m.
-    pub stride_length_m: f64,
+pub use guess_settings::GuessSettings;
+
+/// Steps 1 and 2: the first point of a problem without muscles.
+pub(crate) fn without_muscles(plain: &GaitProgram, settings: &GuessSettings, cancel: &dyn Fn() -> bool) -> Vec<f64> {
+    let postures = posture::solve(plain, settings, cancel);
+    guessed_motion::guess(plain, &postures, settings)
 }
 
-impl Default for GuessSettings {
-    fn default() -> Self {
-        Self { stride_time_s: 1.2, stride_length_m: 1.15 }
-    }
+/// Step 3: the first point of a problem with muscles, from a motion of the problem without them.
+pub(crate) fn with_muscles(program: &GaitProgram, plain: &GaitProgram, motion: &[f64]) -> Vec<f64> {
+    guessed_muscles::guess(program, plain, motion)
 }

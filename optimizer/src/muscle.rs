@@ -2,10 +2,10 @@
 
 pub mod attachment;
 pub mod curves;
+pub mod muscle_tendon_units;
 pub mod parameters;
-pub mod unit;
 
 pub use attachment::Attachment;
 pub use curves::{CurveValue, force_length, force_velocity, tendon_force};
+pub use muscle_tendon_units::{MUSCLE_COUNT, MUSCLES, Muscle};
 pub use parameters::{MuscleField, MuscleOverride, MuscleParameters};
-pub use unit::{MUSCLE_COUNT, MUSCLES, Muscle};

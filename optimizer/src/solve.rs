@@ -4,6 +4,7 @@ use crate::gait_problem::GaitProblem;
 use crate::model_error::ModelError;
 use std::time::Instant;
 
+mod bounds_between_nodes;
 mod cold_start_guesses;
 mod error;
 mod gait_results;
@@ -21,6 +22,7 @@ mod time_limit;
 mod warm_start;
 
 pub use crate::cancel_token::CancelToken;
+use bounds_between_nodes::enforce_between_nodes;
 pub use cold_start_guesses::{CostStrategy, GuessTiming, InitialGuess, MuscleRoute};
 pub use error::SolveError;
 pub use gait_results::GaitResults;
@@ -36,7 +38,7 @@ pub use solve_report::{
     CONVERGED_VIOLATION, LinearAlgebra, Optimality, OtherLocalOptimum, SolveOutcome, SolveReport, SolveStatus,
     SolverRun, StartedFrom, Violation,
 };
-use solver_runs::{FinishedRun, enforce_between_nodes, try_warm};
+use solver_runs::{FinishedRun, try_warm};
 pub use warm_start::WarmStart;
 pub(crate) use warm_start::check_shape;
 use warm_start::on_mesh_of;

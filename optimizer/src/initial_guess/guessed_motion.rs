@@ -1,7 +1,7 @@
 //! The motion of the initial guess: Bezier fits of the postures in each domain, their derivatives, and torques and
 //! forces consistent with the contacts.
 
-use super::GuessSettings;
+use super::guess_settings::GuessSettings;
 use crate::body::{InverseDynamics, PointState};
 use crate::gait_problem::{GaitProgram, PointVariables};
 use crate::muscle::MUSCLE_COUNT;

@@ -5,7 +5,7 @@
 //! QPs with linearised kinematics. If a QP is infeasible, slack variables with a penalty relax every row, because an
 //! initial guess need not be feasible.
 
-use super::GuessSettings;
+use super::guess_settings::GuessSettings;
 use crate::body::{Axis, PointState};
 use crate::gait_problem::GaitProgram;
 use clarabel::algebra::CscMatrix;

@@ -1,7 +1,7 @@
 //! Muscle parameters of a subject: the published table, scaled to the subject or overridden by measured values.
 
 use super::attachment::Joint;
-use super::unit::{MUSCLE_COUNT, MUSCLES, Muscle};
+use super::muscle_tendon_units::{MUSCLE_COUNT, MUSCLES, Muscle};
 use crate::model_error::ModelError;
 use crate::subject::Subject;
 use serde::{Deserialize, Serialize};

@@ -232,8 +232,7 @@ impl InitialGuess {
     ) -> Result<(GaitProgram, Vec<f64>), ModelError> {
         let settings = self.settings();
         let plain = tracked.program(false)?.with_timing(&self.timing.fractions());
-        let postures = initial_guess::posture::solve(&plain, &settings, cancel);
-        let first = initial_guess::guessed_motion::guess(&plain, &postures, &settings);
+        let first = initial_guess::without_muscles(&plain, &settings, cancel);
         Ok((plain, first))
     }
 

@@ -169,7 +169,7 @@ impl<'a> RunInProgress<'a> {
                 let settings = NlpSettings { mu_initial: MU_COST, ..rough };
                 tracked = self.phase(SolvePhase::PlainCost, &plain, &StartPoint::Cold(tracked.x), &settings)?;
             }
-            let with_muscles = initial_guess::guessed_muscles::guess(program, &plain, &tracked.x);
+            let with_muscles = initial_guess::with_muscles(program, &plain, &tracked.x);
             if Self::interrupted(&tracked) {
                 return Ok(blank(program, with_muscles, tracked));
             }

@@ -1,4 +1,4 @@
-//! Solver runs with their results: warm starts, and runs with tightened bounds between nodes.
+//! Solver runs with their results, and warm starts.
 
 use super::error::SolveError;
 use super::phases::{RunInProgress, SolveContext};
@@ -7,7 +7,6 @@ use super::solve_report::{CONVERGED_VIOLATION, LinearAlgebra, SolveStatus, Solve
 use super::warm_start::MeshStart;
 use crate::gait::Gait;
 use crate::gait_problem::gait_of;
-use crate::gait_problem::inter_node_check::inter_node_excess;
 use crate::gait_problem::margins::Margins;
 use crate::gait_rmse::gait_rmse;
 use interior_point::{NlpResult, NonlinearProgram};
@@ -111,40 +110,4 @@ pub(super) fn try_warm(
         run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)
     }?;
     Ok(FinishedRun::new(context, result, strategy, margins, &run))
-}
-
-/// Tightens the bounds that the chosen gait violates between its nodes and continues the solve, until there is no
-/// violation or the rounds are used up. Returns the index of the last converged run, or of a cancelled one.
-pub(super) fn enforce_between_nodes(
-    context: &SolveContext<'_>,
-    tried: &mut Vec<FinishedRun>,
-    mut chosen: usize,
-    observer: &mut dyn FnMut(&IterationRecord),
-) -> Result<usize, SolveError> {
-    for _ in 0..context.options.tightening_rounds {
-        let now = &tried[chosen];
-        if now.candidate.status != SolveStatus::Converged {
-            break;
-        }
-        let excess = inter_node_excess(context.program, &now.candidate.gait, &now.candidate.result.x);
-        if excess.worst <= 1.0 {
-            break;
-        }
-        let mut margins = now.margins.clone();
-        margins.grow(&excess.margins);
-        let point = now.candidate.result.warm_point();
-        let mut run = RunInProgress::new(context, context.options.threads, observer);
-        run.guess = tried.len();
-        let result = run.warm(SolvePhase::InterNode, &context.program.tightened(&margins), point)?;
-        let mut next = FinishedRun::new(context, result, "bounds tightened between nodes", margins, &run);
-        next.run.local_optimum =
-            tried[chosen].run.local_optimum.filter(|_| next.candidate.status == SolveStatus::Converged);
-        let status = next.candidate.status;
-        tried.push(next);
-        if !matches!(status, SolveStatus::Converged | SolveStatus::Cancelled) {
-            break;
-        }
-        chosen = tried.len() - 1;
-    }
-    Ok(chosen)
 }

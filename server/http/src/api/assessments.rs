@@ -13,7 +13,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
 use gaitwright_service::access::{self, Read};
-use gaitwright_service::studies::assessment::{self, NewAssessment};
+use gaitwright_service::studies::assessment_answer::{self, NewAssessment};
 use gaitwright_store::{AssessmentId, StudyId, assessments, studies};
 
 /// List assessments of a study
@@ -63,7 +63,7 @@ pub(super) async fn create(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let made = assessment::give(&mut writer, &request.caller, id, &new).await?;
+    let made = assessment_answer::give(&mut writer, &request.caller, id, &new).await?;
     let row = assessments::get(&mut writer, made).await?;
     request.created(&app, writer, format!("/api/v1/assessments/{made}"), &Assessment::from(row)).await
 }
@@ -108,6 +108,7 @@ pub(super) async fn retract(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let row = assessment::retract(&mut writer, &request.caller, None, id, (why.author.as_deref(), &why.reason)).await?;
+    let row = assessment_answer::retract(&mut writer, &request.caller, None, id, (why.author.as_deref(), &why.reason))
+        .await?;
     request.done(&app, writer, &Assessment::from(row)).await
 }

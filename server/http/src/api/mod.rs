@@ -2,7 +2,6 @@
 //! described.
 
 mod access_log;
-mod ask_tell;
 mod assessments;
 mod audit;
 mod backups;
@@ -20,6 +19,7 @@ mod gaits;
 pub mod health;
 mod history;
 mod jobs;
+mod lab_script_trials;
 mod lab_sessions;
 mod limit_cycles;
 mod measurement_files;
@@ -110,8 +110,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(figures::of_analysis))
         .routes(routes!(figures::of_reference))
         // scripts of the lab
-        .routes(routes!(ask_tell::ask))
-        .routes(routes!(ask_tell::tell))
+        .routes(routes!(lab_script_trials::ask))
+        .routes(routes!(lab_script_trials::tell))
         // blind comparisons
         .routes(routes!(blind::next))
         .routes(routes!(blind::motion))

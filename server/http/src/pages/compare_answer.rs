@@ -11,7 +11,7 @@ use gaitwright_service::access::{self, Caller};
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
 use gaitwright_service::studies::answer_giver::AnswerGiver;
-use gaitwright_service::studies::assessment::{self, NewAssessment};
+use gaitwright_service::studies::assessment_answer::{self, NewAssessment};
 use gaitwright_service::studies::feedback_log::{self, CurrentAnswer};
 use gaitwright_service::studies::preference_answer::{self, Answer, PairAnswer};
 use gaitwright_service::studies::recorded_answer::RecordedAnswer;
@@ -163,7 +163,7 @@ pub(super) async fn give(
         GivenAnswer::Preference(answer) => {
             AnswerId::from(preference_answer::give(&mut writer, caller, id, &answer).await?)
         }
-        GivenAnswer::Assessment(new) => assessment::give(&mut writer, caller, id, &new).await?.into(),
+        GivenAnswer::Assessment(new) => assessment_answer::give(&mut writer, caller, id, &new).await?.into(),
     };
     if !is_reviewed {
         let kept = StoredResponse { request, status: 303, location: None, body: saved.to_string() };
@@ -214,7 +214,7 @@ pub(super) async fn retract(
             preference_answer::retract(&mut writer, caller, Some(id), row.id, author, reason).await?;
         }
         RecordedAnswer::Assessment(row) => {
-            assessment::retract(&mut writer, caller, Some(id), row.id, (author, reason)).await?;
+            assessment_answer::retract(&mut writer, caller, Some(id), row.id, (author, reason)).await?;
         }
     }
     commit(writer).await?;

@@ -8,7 +8,7 @@ pub mod actions_with_known_gait;
 pub mod analysis;
 pub mod answer_giver;
 pub mod archive;
-pub mod assessment;
+pub mod assessment_answer;
 pub mod atlas;
 mod automatic_pause;
 pub mod blind;

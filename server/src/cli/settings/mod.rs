@@ -2,8 +2,8 @@
 //! defaults. Each value has its origin.
 
 mod flags;
-mod known_settings;
 mod setting_origin;
+mod settings_and_defaults;
 mod settings_file;
 mod values;
 mod without_password;
@@ -12,9 +12,9 @@ pub(super) use flags::{AnchoredFlags, Flags, RecordFlags};
 pub(super) use without_password::without_password;
 
 use gaitwright_service::error::Error;
-use known_settings::KNOWN;
-pub(super) use known_settings::unknown_variables;
 use setting_origin::SettingOrigin;
+use settings_and_defaults::KNOWN;
+pub(super) use settings_and_defaults::unknown_variables;
 use settings_file::{parse, read};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

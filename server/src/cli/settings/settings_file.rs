@@ -1,6 +1,6 @@
 //! The settings file.
 
-use super::known_settings::KNOWN;
+use super::settings_and_defaults::KNOWN;
 use gaitwright_service::error::Error;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::controller_file_download::not_included;
 use super::session::still_shown;
 use crate::error::Error;
 use crate::printable;
-use crate::studies::assessment;
+use crate::studies::assessment_answer;
 use crate::studies::feedback_log::{self, AttributedAnswer, SecondAnswer};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::feedback::{Attribution, Source};
@@ -50,7 +50,7 @@ pub(super) async fn record_answer(writer: &mut Writer, session: &LabSession) -> 
         replaces: None,
     };
     let feedback_id = if given.answer.is_assessment() {
-        assessment::write(writer, statement).await.map(drop)
+        assessment_answer::write(writer, statement).await.map(drop)
     } else {
         record_preference(writer, statement).await
     };
