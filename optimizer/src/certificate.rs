@@ -15,7 +15,7 @@
 //!
 //! Step 1 checks the muscles. The closed loop has joint torques as inputs, like the device and the gait problem.
 
-mod check;
+mod checked_quantity;
 mod closed_loop;
 mod contact_kinematics;
 mod differences_from_defaults;
@@ -41,7 +41,7 @@ mod virtual_constraints;
 #[allow(clippy::unwrap_used)]
 mod simulation_tests;
 
-pub use check::Check;
+pub use checked_quantity::Check;
 pub use closed_loop::STRIDES;
 pub use differences_from_defaults::Difference;
 pub use hybrid_walker::Fall;

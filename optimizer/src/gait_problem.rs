@@ -10,6 +10,7 @@
 //! | C8 fibre kinematics | [`fibre_collocation`] |
 //! | C9-C12 joint torques of the muscles | [`fibre_and_tendon_force_rows`] |
 
+pub(crate) mod active_and_unchanged_bounds;
 pub(crate) mod active_constraint;
 mod contact_force_bounds;
 pub mod contact_limits;
@@ -35,11 +36,12 @@ pub mod rows;
 pub mod sparse_entries;
 pub mod stride;
 pub mod transitions;
-pub(crate) mod unchanged_bounds;
 pub mod variable_bounds;
 pub mod virtual_constraint_rows;
 pub mod zero_dynamics_collocation;
 
+pub(crate) use active_and_unchanged_bounds::ConvergedGait;
+pub use active_and_unchanged_bounds::UnchangedBound;
 pub use evaluation::RowViolation;
 pub use gait_of_variables::gait_of;
 pub use layout::{Layout, PointVariables};
@@ -47,5 +49,3 @@ pub use problem_definition::GaitProblem;
 pub use program_data::{GaitProgram, ObjectiveWeights};
 pub use row_names::{RowKind, RowName};
 pub use rows::RowTable;
-pub(crate) use unchanged_bounds::ConvergedGait;
-pub use unchanged_bounds::UnchangedBound;

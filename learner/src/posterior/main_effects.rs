@@ -17,6 +17,16 @@ pub struct MainEffect {
     pub difference: Prediction,
 }
 
+impl MainEffect {
+    /// The dimensions of these effects by how much the utility depends on them, the most important first.
+    pub fn ranked(effects: &[Self]) -> Vec<usize> {
+        let mut ranked: Vec<usize> = (0..effects.len()).collect();
+        let effect = |dimension: usize| effects[dimension].difference.mean;
+        ranked.sort_by(|a, b| effect(*b).total_cmp(&effect(*a)));
+        ranked
+    }
+}
+
 impl Posterior {
     /// The difference between the highest and the lowest marginal utility of a dimension.
     ///

@@ -1,6 +1,6 @@
 //! The closed loop: consecutive strides, and contacts, friction and torques over the periodic stride.
 
-use super::check::{Check, CheckLocation, WorstValues};
+use super::checked_quantity::{Check, CheckLocation, WorstValues};
 use super::feedback_linearization::{State, split};
 use super::hybrid_walker::{CompletedDomain, Fall, HybridWalker};
 use super::limit_excess::{AllowedRanges, depth_below_ground};

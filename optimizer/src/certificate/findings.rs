@@ -1,6 +1,6 @@
 //! The findings of the residuals: the worst value of each quantity, at the nodes and between them.
 
-use super::check::{Check, CheckLocation, Quantity, WorstValues};
+use super::checked_quantity::{Check, CheckLocation, Quantity, WorstValues};
 use crate::gait::between_nodes::GaitInstant;
 
 /// A quantity with two limits: at the nodes, where the gait problem imposes the constraint, and between them, where the

@@ -1,6 +1,6 @@
 //! The limits of all quantities of a certificate, and between the nodes their thresholds.
 
-use super::check::Quantity;
+use super::checked_quantity::Quantity;
 use super::findings::MeasuredQuantity;
 
 /// Vertical force from which a gait laboratory registers contact, N. Smaller violations are irrelevant in practice.

@@ -1,6 +1,6 @@
 //! Residuals of C5 to C12.
 
-use super::check::{CheckLocation, WorstValues};
+use super::checked_quantity::{CheckLocation, WorstValues};
 use super::findings::{Findings, GridPoint};
 use super::limits::{
     MUSCLE_FORCE as FORCE, MUSCLE_LENGTH as LENGTH, MUSCLE_RANGE as RANGE, MUSCLE_RESET as RESET,

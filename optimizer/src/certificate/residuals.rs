@@ -1,6 +1,6 @@
 //! Residuals of C1 to C4 at the nodes and on a finer grid between them.
 
-use super::check::{Check, CheckLocation, WorstValues};
+use super::checked_quantity::{Check, CheckLocation, WorstValues};
 use super::contact_kinematics::Contact;
 use super::findings::{Findings, GridPoint};
 use super::limit_excess::{AllowedRanges, depth_below_ground};

@@ -1,7 +1,7 @@
 //! Maps of the posterior over two tuned bounds, the others held: utility and probability of converging.
 
 use crate::format::{meaning, percent, signed};
-use gait_learner::{LearnerError, SearchSpace};
+use gait_learner::{LearnerError, MainEffect, SearchSpace};
 use gaitwright_charts::{Figure, HeatMap, Tile};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::Analysis;
@@ -46,7 +46,7 @@ pub(crate) fn chosen(analysis: &Analysis, choice: &AxisChoice) -> Result<Option<
         }
     };
     let (x, y) = (place("x", &choice.x)?, place("y", &choice.y)?);
-    let ranked = analysis.dimensions_by_effect();
+    let ranked = MainEffect::ranked(&analysis.main_effects);
     let other_than = |taken: Option<usize>| ranked.iter().copied().find(|place| Some(*place) != taken).unwrap_or(0);
     let x = x.unwrap_or_else(|| other_than(y));
     let y = y.unwrap_or_else(|| other_than(Some(x)));

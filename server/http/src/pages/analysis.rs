@@ -14,7 +14,7 @@ use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
-use gait_learner::{Agreement, Prediction};
+use gait_learner::{Agreement, MainEffect, Prediction};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
@@ -200,7 +200,7 @@ fn worse_by_utility(behind: &Prediction) -> String {
 /// The bounds with several values, the one that matters most first.
 fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
     let dimensions = analysis.posterior.space().dimensions();
-    let ranked = analysis.dimensions_by_effect();
+    let ranked = MainEffect::ranked(&analysis.main_effects);
     let largest = ranked.first().map_or(0.0, |place| analysis.main_effects[*place].difference.mean);
     let row = |place: usize| {
         let effect = &analysis.main_effects[place];

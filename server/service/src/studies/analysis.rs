@@ -61,14 +61,6 @@ pub struct SurprisingAnswer {
 }
 
 impl Analysis {
-    /// The dimensions by how much they matter, the most important first.
-    pub fn dimensions_by_effect(&self) -> Vec<usize> {
-        let mut ranked: Vec<usize> = (0..self.main_effects.len()).collect();
-        let effect = |place: usize| self.main_effects[place].difference.mean;
-        ranked.sort_by(|a, b| effect(*b).total_cmp(&effect(*a)));
-        ranked
-    }
-
     /// Derives the rest from the posterior of a study. CPU-bound.
     fn of(snapshot: &StudySnapshot, posterior: Arc<Posterior>) -> Result<Self, LearnerError> {
         let plan = &snapshot.study.plan;

@@ -21,6 +21,7 @@ pub mod certified_best;
 mod certifier;
 pub mod command;
 pub mod consent;
+mod controller_file;
 pub mod device;
 mod excluded_actions;
 pub mod execution;

@@ -8,7 +8,6 @@ use super::safety_reports::SafetyReports;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
-use gait_optimizer::export::ControllerFile;
 use gaitwright_store::certificates::{self, CertificateOnRecord};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{
@@ -60,27 +59,6 @@ impl WalkableGait {
     pub async fn trajectory(&self, db: &mut Connection) -> StoreResult<Packed<Gait>> {
         gaits::get(db, self.trial).await
     }
-
-    /// The controller file of this gait, which states whether its certificate passed. `gait` is [`Self::trajectory`].
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for a rate out of range.
-    pub fn controller_file(&self, gait: &Gait, rate_hz: f64) -> Result<String, Error> {
-        let certificate_passed = Some(self.certified == Certified::Passed);
-        pretty(&ControllerFile { certificate_passed, ..ControllerFile::new(gait, rate_hz)? })
-    }
-
-    /// The controller file of this gait for a blinded walk, without anything that names the gait.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] for a rate out of range.
-    pub fn blinded_controller_file(&self, gait: &Gait, rate_hz: f64) -> Result<String, Error> {
-        pretty(&ControllerFile::new(gait, rate_hz)?)
-    }
-}
-
-fn pretty(file: &ControllerFile) -> Result<String, Error> {
-    serde_json::to_string_pretty(file).map_err(|e| Error::Internal(e.to_string()))
 }
 
 /// Why a gait must not be used for walking or compared.

@@ -4,13 +4,13 @@ mod chosen_reference;
 mod clone;
 mod fields;
 mod planning;
-mod space_editor;
+mod tuned_and_fixed_bounds;
 
 use self::chosen_reference::ReferenceChoice;
 use self::clone::cloned;
 use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal};
 use self::planning::{faults, make};
-use self::space_editor::SpaceEditor;
+use self::tuned_and_fixed_bounds::SpaceEditor;
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;

@@ -2,7 +2,7 @@
 
 use super::clone::cloned;
 use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal, learner, place_in_form};
-use super::space_editor::SpaceEditor;
+use super::tuned_and_fixed_bounds::SpaceEditor;
 use gait_optimizer::{LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
