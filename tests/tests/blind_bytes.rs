@@ -239,15 +239,15 @@ async fn kinds_of_pairs_that_look_the_same(service: &Service) -> Vec<BlindPairKi
 
 #[tokio::test]
 async fn repeated_pair_looks_like_a_new_one_even_after_answers_of_others() {
-    let (_folder, service) = service().await;
     // The operating system draws which pairs are repeats, one in ten. How many pairs a study shows varies, because
     // nobody is asked twice about the same two gaits. Among 300 pairs there is no repeat with a chance of 2e-14.
     let mut shown = 0;
     while shown < 300 {
+        let (_folder, service) = service().await;
         let kinds = kinds_of_pairs_that_look_the_same(&service).await;
+        service.stop().await;
         assert!(!kinds.is_empty(), "a study of forty trials has pairs");
         if kinds.contains(&BlindPairKind::Repeat) {
-            service.stop().await;
             return;
         }
         shown += kinds.len();
