@@ -76,7 +76,7 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let coming = service.fetch(&format!("/api/v1/jobs/explanation-{}", last.id)).await;
     assert_eq!(coming.json()["state"], "queued", "{}", coming.text);
     let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
-    assert!(page.contains("The explanation of this trial is queued") && page.contains("/explain\""), "{page}");
+    assert!(page.contains("The service explains this trial by itself") && page.contains("/explain\""), "{page}");
 
     let found = explained(&service, last.id).await;
     let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();
@@ -99,7 +99,7 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
 
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     let reason = format!(
-        "In {0} of the {0} trials with an explanation, relaxing a5 (swing-foot clearance) alone gives a gait",
+        "In all {0} trials with an explanation, relaxing a5 (swing-foot clearance) alone gives a gait",
         trials.len()
     );
     assert!(page.contains(&reason) && page.contains(&format!("/trials/{}#explanation", trials[0].id)), "{page}");

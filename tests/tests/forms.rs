@@ -55,6 +55,7 @@ async fn browsers_get_error_pages_and_programs_problem_documents() {
     ] {
         is_page(&service.fetch(&path).await, status, "Back to the home page");
     }
+    is_page(&service.fetch("/units").await, StatusCode::METHOD_NOT_ALLOWED, "There is no page at this address.");
     let wrong_method = service.post("/api/v1/health", &json!({})).await;
     assert_eq!(wrong_method.status, StatusCode::METHOD_NOT_ALLOWED);
     assert_eq!(wrong_method.content_type(), "application/problem+json");
@@ -274,11 +275,8 @@ async fn form_sent_twice_with_another_answer_shows_the_recorded_one() {
     let other = send("b", "K").await;
     is_page(&other, StatusCode::CONFLICT, "this one was not saved");
     assert!(other.text.contains("Saved") && other.text.contains(" is better than "), "the stored answer is shown");
-    assert!(
-        other.text.contains("value=\"b\" aria-current=\"true\"") && other.text.contains("firm</textarea>"),
-        "{}",
-        other.text
-    );
+    assert!(!other.text.contains("class=\"answer\""), "the buttons that were refused: {}", other.text);
+    assert!(other.text.contains("<q>firm</q>") && other.text.contains("compare?change="), "{}", other.text);
     assert_eq!(service.feedback(study).await.len(), before + 1);
     service.stop().await;
 }
@@ -316,6 +314,41 @@ async fn second_answer_of_the_same_person_is_refused_until_the_first_is_retracte
     let other = format!("{ahead}&answer=b&source=clinician&author=L&note=&key={}", key(6));
     assert_eq!(service.post_text(&path, FORM, &other).await.status, StatusCode::SEE_OTHER);
     assert_eq!(send(&ahead, "unsafe_a", 7).await.status, StatusCode::SEE_OTHER);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn finished_study_offers_each_pair_of_different_gaits_until_it_is_answered() {
+    let (_folder, service) = service().await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let path = format!("/studies/{study}/compare");
+    let offered = async || {
+        let page = service.fetch(&path).await.text;
+        let pair = page.split_once("data-answer=\"").and_then(|(_, rest)| rest.split_once('"'));
+        (pair.and_then(|(pair, _)| pair.split_once(' ')).map(|(a, b)| (a.to_owned(), b.to_owned())), page.clone())
+    };
+    let mut seen = Vec::new();
+    let last = loop {
+        let (Some((a, b)), _) = offered().await else { break seen.len() };
+        assert!(!seen.contains(&(a.clone(), b.clone())), "offered again: {a} {b}");
+        seen.push((a.clone(), b.clone()));
+        let key = format!("01890000-0000-7000-8000-{:012}", seen.len());
+        let body = format!("a={a}&b={b}&answer=a&source=clinician&author=K&note=&key={key}");
+        assert_eq!(service.post_text(&path, FORM, &body).await.status, StatusCode::SEE_OTHER);
+    };
+    assert!(last > 0);
+    let (_, page) = offered().await;
+    assert!(page.contains("All pairs of different gaits are answered") && page.contains("Answers so far"), "{page}");
+    assert!(!page.contains("class=\"answer\"") && page.contains("compare?change="), "{page}");
+    // Another person can still choose two gaits, and a person who undoes is back at them.
+    let (a, b) = seen.pop().unwrap();
+    let body = format!("a={a}&b={b}&answer=b&source=clinician&author=L&note=&key=01890000-0000-7000-8000-000000000999");
+    let saved = service.post_text(&path, FORM, &body).await.headers["location"].to_str().unwrap().to_owned();
+    let form = format!("saved={}&author=L", saved.split("saved=").nth(1).unwrap());
+    let undone = service.post_text(&format!("/studies/{study}/undo"), FORM, &form).await;
+    let page = service.fetch(undone.headers["location"].to_str().unwrap()).await.text;
+    assert!(page.contains("(retracted)") && page.contains(&format!("data-answer=\"{a} {b}\"")), "{page}");
     service.stop().await;
 }
 
@@ -373,7 +406,9 @@ async fn study_without_answers_has_no_best_action() {
     service.wait_for(study, &[StudyState::Waiting]).await;
     let page = service.fetch(&format!("/studies/{study}")).await.text;
     assert!(
-        page.contains("No answers from people yet") && !page.contains("best action so far") && !page.contains(">best<")
+        page.contains("No answers from people yet")
+            && !page.contains("best action so far")
+            && !page.contains(">recommended<")
     );
     let trials = service.trials(study).await;
     let (new, old) = (trials[trials.len() - 1].id, trials[trials.len() - 2].id);
@@ -898,6 +933,11 @@ async fn withdrawal_needs_confirmation_and_the_subject_is_offered_no_more() {
         assert!(!service.fetch(page).await.text.contains(&option), "{page}");
     }
     assert!(service.fetch("/subjects").await.text.contains("consent withdrawn"));
+    let form = service.fetch(&format!("/studies/new?subject={subject}")).await.text;
+    let select = form.split_once("<select id=\"subject\"").unwrap().1.split_once("</select>").unwrap().0;
+    assert!(form.contains("withdrew consent and cannot have new studies"), "{form}");
+    assert_eq!(select.matches(" selected").count(), 1, "{select}");
+    assert!(select.contains("<option value=\"\" selected>Choose a subject"), "{select}");
     service.stop().await;
 }
 

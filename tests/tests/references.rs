@@ -47,7 +47,7 @@ async fn gait_rmse_is_not_compared_between_studies_with_different_reference_gait
             assert!(row["best_cost_of_transport"].is_number() && row["reference_gait_id"].is_string(), "{row}");
         }
         let page = service.fetch(&format!("/studies/compare?a={a}&b={b}")).await.text;
-        assert_eq!(page.contains("Gait RMSE of the best trial"), comparable);
+        assert_eq!(page.contains("Gait RMSE of the recommended trial"), comparable);
         assert_eq!(page.contains("class=\"sided\""), comparable);
         assert_eq!(page.contains(warning), !comparable);
         let figures = service.fetch(&format!("/studies/{a}/figures?other={b}")).await.text;
@@ -137,7 +137,8 @@ async fn preview_shows_strikes_and_strides_of_a_recording_and_stores_nothing() {
     let found = previewed("S03", "", &recording()).await;
     assert_eq!(found.status, StatusCode::OK, "{}", found.text);
     assert!(
-        found.text.contains("The recording can be imported.") && found.text.contains("Mean stride"),
+        found.text.contains("The recording can be imported, but look at it first.")
+            && found.text.contains("Mean stride"),
         "{}",
         found.text
     );

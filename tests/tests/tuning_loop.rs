@@ -136,7 +136,7 @@ async fn study_of_thirty_trials_has_no_gait_twice_unless_results_may_repeat() {
             let distinct: HashSet<_> = converged.clone().map(used).collect();
             assert_eq!(distinct.len() < converged.count(), repeats, "{method:?}");
             let page = service.fetch(&format!("/studies/{study}")).await.text;
-            assert!(page.contains("Bounds that have not been active in any gait so far: a2, a3, a4, a8."), "{page}");
+            assert!(page.contains("Bounds that were not active in any gait: a2, a3, a4, a8."), "{page}");
             let recommendation = loop {
                 let found = service.fetch(&format!("/api/v1/studies/{study}/recommendation")).await;
                 if found.status == StatusCode::OK {

@@ -108,7 +108,8 @@ async fn undo_of_a_changed_answer_on_the_page_brings_the_former_one_back() {
     // Without a former answer, nothing counts after an undo.
     let pair = format!("a={b}&b={a}&answer=cannot_tell&source=clinician&author=L&note=&key={}", AnswerId::fresh());
     let only = saved(&service.post_text(&format!("/studies/{study}/compare"), FORM, &pair).await);
-    assert_eq!(saved(&press_undo(&service, study, &only).await), only);
+    let undone = saved(&press_undo(&service, study, &only).await);
+    assert!(undone.starts_with(&format!("{only}&a=")), "back to the two gaits: {undone}");
     assert_eq!(in_force(&service, &[&only, &standing]).await, [false, true]);
     service.stop().await;
 }

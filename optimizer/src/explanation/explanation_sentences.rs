@@ -118,7 +118,7 @@ impl Conflict {
             ),
         };
         let missed = self.violations.first().map_or(String::new(), |worst| {
-            format!("; the nearest motion violates {} by {}", worst.row, worst.amount_in_words())
+            format!("; the nearest motion violates the limit of {} by {}", worst.constraint(), worst.amount_in_words())
         });
         let (from, caveat) = (from_starts(self.starts), caveat(self.undecided));
         format!("{without}{claim}{tried}, no gait was found{from}{caveat}{missed}.{relief}")
@@ -187,7 +187,8 @@ impl BoundValue {
         let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
         let quantity = limited.strip_prefix("minimum ").or_else(|| limited.strip_prefix("maximum "));
         let quantity = quantity.unwrap_or(limited);
-        format!("a {quantity} of at {} {value}", if is_lower { "least" } else { "most" })
+        let article = if quantity.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+        format!("{article} {quantity} of at {} {value}", if is_lower { "least" } else { "most" })
     }
 }
 

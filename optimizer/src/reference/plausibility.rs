@@ -87,7 +87,10 @@ pub(super) fn unlike_builtin(mean: &[[f64; 5]]) -> Result<Option<String>, ModelE
         .into_iter()
         .filter_map(|(place, name)| match correlation(&curve(mean, place), &curve(&builtin, place)) {
             Some(correlation) if correlation >= LEAST_CORRELATION => None,
-            Some(correlation) => Some(format!("{name} (correlation {:.2})", hundredths(correlation))),
+            Some(correlation) => {
+                // A minus sign, as in every text for people.
+                Some(format!("{name} (correlation {:.2})", hundredths(correlation)).replace('-', "\u{2212}"))
+            }
             None => Some(format!("{name} (constant)")),
         })
         .collect();

@@ -5,7 +5,7 @@
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Contour {
     /// The value.
-    pub(super) level: f64,
+    level: f64,
     /// Pieces of the line, which meet where they cross from one square of four values to the next.
     pub(super) pieces: Vec<[(f64, f64); 2]>,
 }

@@ -31,8 +31,6 @@ pub struct HeatMap {
     pub cells: Vec<Vec<Tile>>,
     /// Values of the lightest and the darkest shade.
     pub range: (f64, f64),
-    /// Whether the values are shares, which contour lines show in percent.
-    pub in_percent: bool,
 }
 
 const WIDTH: f64 = 640.0;
@@ -42,10 +40,6 @@ const ROW: f64 = 52.0;
 const BOTTOM: f64 = 60.0;
 /// The darkest shade, on which text is readable in the light and the dark scheme.
 const DARKEST: f64 = 0.5;
-/// Half the width and height of the text of a cell at its largest size, and how far below the centre of the cell it is.
-const CELL_TEXT: (f64, f64, f64) = (28.0, 16.0, 3.0);
-/// Half the width and height of the label of a contour line.
-const LEVEL_TEXT: (f64, f64) = (20.0, 7.0);
 
 impl HeatMap {
     /// The map as an SVG element.
@@ -84,8 +78,7 @@ impl HeatMap {
     fn draw(&self, svg: &mut String) -> std::fmt::Result {
         self.draw_cells(svg)?;
         let grid: Vec<Vec<f64>> = self.cells.iter().map(|row| row.iter().map(|cell| cell.value).collect()).collect();
-        let contours = self.labelled(contours(&grid));
-        for (Contour { pieces, .. }, _) in &contours {
+        for Contour { pieces, .. } in contours(&grid) {
             svg.push_str("<path class=\"contour\" d=\"");
             for piece in pieces {
                 let [from, to] = piece.map(|end| self.place(end));
@@ -93,8 +86,7 @@ impl HeatMap {
             }
             svg.push_str("\"/>");
         }
-        self.draw_texts(svg)?;
-        contours.iter().try_for_each(|(contour, at)| self.draw_level(svg, contour.level, *at))
+        self.draw_texts(svg)
     }
 
     fn draw_cells(&self, svg: &mut String) -> std::fmt::Result {
@@ -147,59 +139,6 @@ impl HeatMap {
         )?;
         write!(svg, "<text class=\"label start\" x=\"4\" y=\"18\">{}</text>", escape(&self.rows.0))
     }
-
-    /// The contour lines, each with the place of its label, where it hides least of the cells' texts and of other labels. A line
-    /// whose label would hide the text of a cell is left out: it goes around this cell only.
-    fn labelled(&self, contours: Vec<Contour>) -> Vec<(Contour, Area)> {
-        let mut taken: Vec<Area> = Vec::new();
-        for (row, cells) in self.cells.iter().enumerate() {
-            taken.extend((0..cells.len()).map(|column| {
-                let (x, y) = self.place((row as f64, column as f64));
-                Area { x, y: y + CELL_TEXT.2, half_width: CELL_TEXT.0, half_height: CELL_TEXT.1 }
-            }));
-        }
-        let mut labelled = Vec::new();
-        for contour in contours {
-            let along = |piece: &[(f64, f64); 2]| {
-                let [from, to] = piece.map(|end| self.place(end));
-                let between = |share: f64| (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1));
-                [0.1, 0.3, 0.5, 0.7, 0.9].map(between)
-            };
-            let areas = contour.pieces.iter().flat_map(along);
-            let areas = areas.map(|(x, y)| Area { x, y, half_width: LEVEL_TEXT.0, half_height: LEVEL_TEXT.1 });
-            let hidden = |area: &Area| taken.iter().map(|other| area.shared_with(other)).sum::<f64>();
-            let Some(best) = areas.min_by(|a, b| hidden(a).total_cmp(&hidden(b))) else { continue };
-            if hidden(&best) < LEVEL_TEXT.0 * LEVEL_TEXT.1 {
-                taken.push(best);
-                labelled.push((contour, best));
-            }
-        }
-        labelled
-    }
-
-    fn draw_level(&self, svg: &mut String, level: f64, at: Area) -> std::fmt::Result {
-        let text = if self.in_percent { format!("{:.0} %", 100.0 * level) } else { format!("{level:+.2}") };
-        let text = if level == 0.0 { "0".to_owned() } else { text.replace('-', "\u{2212}") };
-        write!(svg, "<text class=\"level\" x=\"{:.1}\" y=\"{:.1}\">{text}</text>", at.x, at.y + 4.0)
-    }
-}
-
-/// A rectangle around its centre.
-#[derive(Clone, Copy)]
-struct Area {
-    x: f64,
-    y: f64,
-    half_width: f64,
-    half_height: f64,
-}
-
-impl Area {
-    /// The size of the common part.
-    fn shared_with(&self, other: &Self) -> f64 {
-        let across = self.half_width + other.half_width - (self.x - other.x).abs();
-        let along = self.half_height + other.half_height - (self.y - other.y).abs();
-        across.max(0.0) * along.max(0.0)
-    }
 }
 
 #[cfg(test)]
@@ -215,7 +154,6 @@ mod tests {
             rows: ("y".to_owned(), vec![3.0]),
             cells: vec![vec![cell(1.0), cell(2.0)]],
             range: (1.0, 1.0),
-            in_percent: false,
         };
         let svg = map.svg();
         assert_eq!(svg.matches("<rect").count(), 2);
@@ -224,19 +162,18 @@ mod tests {
     }
 
     #[test]
-    fn contour_lines_are_between_the_cells_and_have_their_levels() {
+    fn contour_lines_are_between_the_cells() {
         let cell = |value: f64| Tile { value, text: format!("{value}"), below: String::new(), framed: false };
-        let map = |in_percent| HeatMap {
+        let map = HeatMap {
             title: "t".to_owned(),
             columns: ("x".to_owned(), vec![1.0, 2.0]),
             rows: ("y".to_owned(), vec![3.0, 4.0]),
             cells: vec![vec![cell(0.2), cell(0.8)], vec![cell(0.2), cell(0.8)]],
             range: (0.2, 0.8),
-            in_percent,
         };
-        let svg = map(true).svg();
+        let svg = map.svg();
         // Half way between both columns.
         assert!(svg.contains("<path class=\"contour\" d=\"M353.0 60.0L353.0 112.0\"/>"), "{svg}");
-        assert!(svg.contains(">50 %</text>") && map(false).svg().contains(">+0.50</text>"), "{svg}");
+        assert!(!svg.contains("50 %") && !svg.contains("0.50"), "the numbers are in the cells: {svg}");
     }
 }

@@ -70,10 +70,7 @@ impl Parallel {
     pub fn legend(&self) -> Vec<(String, String)> {
         let mut legend = Vec::new();
         if self.lines.iter().any(|line| line.outcome.is_some()) {
-            legend.push((
-                "key c0 solid".to_owned(),
-                "trial with a gait: the fainter the line, the worse the gait".to_owned(),
-            ));
+            legend.push(("key c0 solid".to_owned(), "trial with a gait; fainter lines are worse gaits".to_owned()));
         }
         if self.lines.iter().any(|line| line.outcome.is_none()) {
             legend.push(("key c1 dashed".to_owned(), "trial without a gait".to_owned()));
@@ -163,7 +160,7 @@ impl Parallel {
         // Over the lines, which would make them hard to read.
         for (place, axis) in self.axes.iter().enumerate() {
             for (own, value) in axis.values.iter().enumerate() {
-                let y = level(axis, own) + 5.0;
+                let y = level(axis, own) - 5.0;
                 write!(svg, "<text class=\"tick y over\" x=\"{:.1}\" y=\"{y:.1}\">{value}</text>", x(place) - 6.0)?;
             }
         }

@@ -52,10 +52,7 @@ pub(crate) fn not_signed_in() -> Error {
 pub(crate) fn permitted<P: RequiredRight>(extensions: &Extensions) -> Result<Caller, Error> {
     let caller = extensions.get::<Caller>().ok_or_else(not_signed_in)?;
     match P::NEEDED {
-        Some(needed) if !caller.may(needed) => Err(Error::Forbidden(format!(
-            "This request requires the right `{}`, which you do not have. Ask an administrator for it.",
-            needed.as_str()
-        ))),
+        Some(needed) if !caller.may(needed) => Err(Error::MissingRight(needed.as_str())),
         _ => Ok(caller.clone()),
     }
 }

@@ -55,7 +55,11 @@ pub(crate) fn quoted(text: &str) -> String {
 
 /// A refusal under the label of its field.
 pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
-    let Some(allowed) = fault.allowed.as_deref() else { return fault.message.clone() };
+    let Some(allowed) = fault.allowed.as_deref() else {
+        // A sentence that begins with the name of the field, such as `recording, line 3: ...`.
+        let rest = fault.message.strip_prefix(&fault.field).filter(|rest| rest.starts_with([':', ',']));
+        return rest.map_or_else(|| fault.message.clone(), |rest| format!("{label}{rest}"));
+    };
     let given = match &fault.value {
         // The form shows names in place of identifiers.
         Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => Some(quoted(text)),
@@ -125,6 +129,14 @@ fn labelled(fault: &FieldError, labels: &[(&str, &str)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sentences_about_files_begin_with_the_label_of_the_field() {
+        let fault = FieldError::in_words("recording", "recording, line 1: the first column is \"t\"");
+        assert_eq!(labelled(&fault, &[]), "File contents, line 1: the first column is \"t\"");
+        let fault = FieldError::in_words("recording", "recording: column \"RF_L\" is missing");
+        assert_eq!(labelled(&fault, &[]), "File contents: column \"RF_L\" is missing");
+    }
 
     #[test]
     fn refusal_suggests_the_value_in_the_unit_of_the_field() {

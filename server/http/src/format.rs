@@ -60,6 +60,9 @@ fn minus(text: &str) -> String {
     text.replace('-', "\u{2212}")
 }
 
+/// The version of the program.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
+
 /// `−0.1 to 0.2`.
 pub(crate) fn range(minimum: f64, maximum: f64) -> String {
     minus(&format!("{} to {}", grouped(&minimum.to_string()), grouped(&maximum.to_string())))
@@ -179,6 +182,23 @@ pub(crate) fn meaning(name: &str) -> &'static str {
     TunedBounds::place_of(name).map_or("", |place| TunedBounds::MEANINGS[place])
 }
 
+/// A bound in words, with angles in degrees: `Torso lean at most 17.2° (0.3 rad)`.
+pub(crate) fn limit_in_words(name: &str, value: f64) -> String {
+    let place = TunedBounds::place_of(name);
+    let limited = TunedBounds::quantity_of(name);
+    let limited = limited.strip_prefix("minimum ").or_else(|| limited.strip_prefix("maximum ")).unwrap_or(limited);
+    let side = if place.is_some_and(|place| TunedBounds::IS_LOWER[place]) { "at least" } else { "at most" };
+    let stored = TunedBounds::in_unit(name, value);
+    let shown = match TunedBounds::unit_of(name).strip_prefix("rad") {
+        Some("") => format!("{}° ({stored})", number(value.to_degrees())),
+        Some(per) => format!("{} °{per} ({stored})", number(value.to_degrees())),
+        None => stored,
+    };
+    let mut letters = limited.chars();
+    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{} {side} {shown}", letters.as_str())
+}
+
 /// One bound: name, value, what it limits.
 pub(crate) struct Bound {
     pub(crate) name: &'static str,
@@ -199,6 +219,13 @@ pub(crate) fn bounds(action: &TunedBounds) -> Vec<Bound> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bounds_in_words_say_which_side_they_limit_and_have_angles_in_degrees() {
+        assert_eq!(limit_in_words("a3", 0.3), "Hip velocity at least 0.3 m/s");
+        assert_eq!(limit_in_words("a6", 0.3), "Torso lean at most 17.2° (0.3 rad)");
+        assert_eq!(limit_in_words("a8", 30.0), "Ankle angle at most 30°");
+    }
 
     #[test]
     fn numbers_have_three_digits_without_trailing_zeros() {

@@ -4,7 +4,7 @@ use crate::form_errors;
 use crate::problem_details::{Problem, Refusal};
 use crate::responded_to::RespondedTo;
 use askama::Template;
-use axum::http::{Method, Uri};
+use axum::http::{Method, StatusCode, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use gaitwright_service::access::Role;
 use gaitwright_service::error::Error;
@@ -35,6 +35,10 @@ impl IntoResponse for PageError {
         }
         let error = match self.0 {
             Error::Invalid(fault) => Error::Invalid(Box::new(form_errors::with_label(*fault))),
+            // The names of rights are for programs.
+            Error::MissingRight(_) => {
+                Error::Forbidden("Your account does not give access to this. Ask an administrator for it.".to_owned())
+            }
             other => other,
         };
         // `responses::complete` renders it with the navigation of the caller.
@@ -57,7 +61,12 @@ fn without_identifier(detail: &str) -> Option<String> {
 /// Renders a problem as a page with the navigation of the caller.
 pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
     let status = problem.status();
-    let detail = without_identifier(&problem.detail).unwrap_or_else(|| problem.detail.clone());
+    let detail = match without_identifier(&problem.detail) {
+        Some(detail) => detail,
+        // A browser opens the address of a form only if somebody typed it.
+        None if status == StatusCode::METHOD_NOT_ALLOWED => "There is no page at this address.".to_owned(),
+        None => problem.detail.clone(),
+    };
     let problem = Problem { detail, ..problem };
     match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),

@@ -94,7 +94,7 @@ impl From<&Error> for Problem {
             Error::Changed(_) => Self::new(ProblemKind::Changed, detail),
             Error::TooLarge(_) => Self::new(ProblemKind::TooLarge, detail),
             Error::MethodNotAllowed { .. } => Self::new(ProblemKind::MethodNotAllowed, detail),
-            Error::Forbidden(_) => Self::new(ProblemKind::Forbidden, detail),
+            Error::Forbidden(_) | Error::MissingRight(_) => Self::new(ProblemKind::Forbidden, detail),
             Error::Conflict(_) => Self::new(ProblemKind::Conflict, detail),
             Error::CannotBeUndone(_) => Self::new(ProblemKind::CannotBeUndone, detail),
             Error::Learner(_) => Self::new(ProblemKind::Learner, detail),

@@ -142,14 +142,17 @@ pub enum Error {
     #[error("{0}")]
     TooLarge(String),
     /// The address does not accept this method.
-    #[error("{path} does not accept the method {method}.")]
+    #[error("The method {method} is not accepted at {path}.")]
     MethodNotAllowed {
         /// The method.
         method: String,
         /// The address.
         path: String,
     },
-    /// The caller lacks a right, or the request comes from another origin.
+    /// The caller lacks the right with this name.
+    #[error("This request requires the right `{0}`, which you do not have. Ask an administrator for it.")]
+    MissingRight(&'static str),
+    /// The caller must not do this, or the request comes from another origin.
     #[error("{0}")]
     Forbidden(String),
     /// The current state does not allow the request.

@@ -48,6 +48,25 @@ async fn browser_animation_plays_pauses_and_is_scrubbed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn browser_walker_stays_in_sight_beside_and_above_the_charts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let (site, trial) = with_a_gait().await;
+    let page = browser.open(&site.at(&format!("/trials/{trial}"))).await;
+    page.wait_for("[data-play]").await;
+    for (width, height, highest) in [(1280, 800, 800.0), (768, 1024, 300.0), (390, 844, 250.0)] {
+        page.resize(width, height).await;
+        page.run("document.querySelector('#torques').scrollIntoView()").await;
+        let place = "(() => { const at = document.querySelector('.viewer svg.gait-walker').getBoundingClientRect(); \
+            return at.top >= 0 && at.bottom <= innerHeight ? at.height : -1 })()";
+        let shown: f64 = page.value(place).await.parse().unwrap();
+        assert!(shown > 100.0 && shown <= highest, "{width} x {height}: {shown}");
+        assert_eq!(page.beyond().await, "0");
+    }
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn browser_gait_is_shown_completely_with_coloured_muscles() {
     let Some(browser) = Chromium::launch().await else { return };
     let (site, trial) = with_a_gait().await;
@@ -193,7 +212,7 @@ async fn browser_shows_an_explanation_when_it_is_ready() {
     page.click("#explanation button").await;
     page.wait_for("#explanation .pulse").await;
     page.wait_for("#explanation li").await;
-    let text = page.text("#explanation").await;
+    let text = page.value("document.querySelector('#explanation').textContent").await;
     assert!(
         text.contains("Relaxing a5 (swing-foot clearance) alone, to 0.03 m")
             && !text.contains("is solving this trial again"),

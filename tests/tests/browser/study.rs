@@ -25,11 +25,12 @@ async fn browser_starts_a_study_with_three_clicks_and_follows_it_to_its_end() {
     assert!(!page.text("#trials").await.contains("No trials yet") && page.count("#trials form.filter").await == 1);
     assert_eq!(page.count("[data-part=history] svg.chart").await, 1);
     // The recommendation can be downloaded.
-    let bounds = "document.querySelector('[data-part=best] a[download][href*=\".json\"]').getAttribute('href')";
+    let bounds =
+        "document.querySelector('[data-part=best] a[download][href*=\"recommendation?\"]').getAttribute('href')";
     let bounds = page.value(bounds).await;
     let told = site.service.fetch(&bounds).await.json();
     assert!(told["bounds"]["a1"].is_number() && told["gait_rmse_rad"].is_number(), "{told}");
-    page.click("[data-part=best] a.button").await;
+    page.click("[data-part=best] a.button[href^='/trials/']").await;
     page.wait_for(".walker svg.gait-walker").await;
     page.wait_for("[data-phase]").await;
     assert!(page.count("svg.chart").await >= 12);
@@ -278,10 +279,10 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
         row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
         ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
     assert_eq!(page.value(by_rmse).await, "true");
-    let bars = "[...document.querySelectorAll('#main-effects meter')].map(m => m.value)";
+    let bars = "[...document.querySelectorAll('#main-effects rect')].map(bar => bar.width.baseVal.value)";
     assert_eq!(
         page.value(&format!(
-            "{bars}.length === 8 && {bars}[0] === 1 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])"
+            "{bars}.length === 8 && {bars}[0] > 0 && {bars}.every((v, i, all) => i === 0 || v <= all[i - 1])"
         ))
         .await,
         "true"
@@ -392,8 +393,12 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     }
     site.service.wait_for(study, &[StudyState::Waiting]).await;
     let plain = browser.open_without_scripts(&site.at(&format!("/studies/{study}/compare"))).await;
-    // The answers stand below the pictures of both gaits.
-    plain.resize(1280, 2000).await;
+    // Each answer stands under the pictures of its gait, and each label is shown once.
+    plain.resize(1280, 800).await;
+    let (bottom, ..) = plain.lowest(".motions .answer").await;
+    assert!(bottom <= 800.0, "{bottom}");
+    let shown = "[...document.querySelectorAll('figcaption')].filter((label) => label.checkVisibility()).length";
+    assert_eq!(plain.value(shown).await, "2");
     plain.click_plainly("#author").await;
     plain.type_text("K2").await;
     // Enter presses the first button of the form, which answers nothing.
@@ -404,11 +409,10 @@ async fn browser_answers_a_comparison_with_the_keyboard_and_without_scripts() {
     plain.wait_for(".notice.good").await;
     // Undone on the next page, and given again.
     plain.click_plainly(".notice.good [data-undo] button").await;
-    plain.wait_for(".notice.good a[href*='a=']").await;
+    plain.wait_until("location.search.includes('&a=')").await;
+    plain.wait_for(".motions .answer").await;
     let undone = site.service.feedback(study).await.into_iter().find(|row| row.author == "K2").unwrap();
     assert_eq!(undone.retraction.unwrap().reason, "undone immediately after answering");
-    plain.click_plainly(".notice.good a[href*='a=']").await;
-    plain.wait_for("#author").await;
     plain.click_plainly("#author").await;
     plain.type_text("K2").await;
     plain.click_plainly("button[value=b]").await;
@@ -568,6 +572,30 @@ async fn browser_does_not_offer_an_answered_comparison_as_the_next_one() {
     }
     other.wait_until("document.querySelector('.notice.bad[role=alert]:not([data-unsent])') !== null").await;
     assert!(!other.text("main").await.contains("is below"));
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_prints_the_recommended_gait_with_date_and_version() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.number_of_trials = 3).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
+    let shown = |selector: &str| format!("document.querySelector('{selector}')?.checkVisibility() ?? false");
+    assert_eq!(page.value(&shown("p.paper")).await, "false", "on screens");
+    page.be_paper().await;
+    for (selector, printed) in [
+        (".outcome svg.gait-walker", "true"),
+        ("p.paper", "true"),
+        (".index", "false"),
+        ("#export", "false"),
+        (".controls", "false"),
+        ("#analysis a[href$=analysis]", "false"),
+    ] {
+        assert_eq!(page.value(&shown(selector)).await, printed, "{selector}");
+    }
+    assert!(page.text("p.paper").await.contains(concat!("Gaitwright ", env!("CARGO_PKG_VERSION"))));
     browser.close().await;
 }
 

@@ -66,7 +66,7 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
     let mut visit = Visit::begin(&browser, &site, "how do two studies compare").await;
     visit.press(".heading a[href='/studies/compare']").await;
     visit.press("form.filter button").await;
-    visit.ends_at("main h2", "The best gaits", 2).await;
+    visit.ends_at("main h2", "The recommended gaits", 2).await;
 
     let trials = site.service.trials(finished).await;
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();

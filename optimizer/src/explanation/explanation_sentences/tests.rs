@@ -100,7 +100,7 @@ fn sentences_of_an_explanation_come_in_order() {
         [
             "a4 = 0.5 m/s (maximum hip velocity) and a7 = 5° (hip angle) conflict with each other: with both at these values and \
              the other bounds at their loosest, no gait was found from 5 starts; the nearest motion violates \
-             SS1_R node 12, forward hip velocity by 0.107 m/s. If either of them is at its loosest value as well, \
+             the limit of forward hip velocity by 0.107 m/s. If either of them is at its loosest value as well, \
              there is a gait.",
             "Relaxing a7 (hip angle) alone, to 15° instead of 5°, gives a gait; with 14.6°, no gait was found from 3 \
              starts.",
@@ -131,8 +131,8 @@ fn conflicts_of_any_number_of_bounds_have_sentences() {
     assert_eq!(
         fixed,
         "The conflict does not depend on the bounds: fixed constraints conflict with each other (among them a slow start). \
-         With every bound at its loosest value, no gait was found from 5 starts; the nearest motion violates SS1_R \
-         node 12, forward hip velocity by 0.107 m/s."
+         With every bound at its loosest value, no gait was found from 5 starts; the nearest motion violates the limit \
+         of forward hip velocity by 0.107 m/s."
     );
     let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
     assert!(further.starts_with("With a4 at its loosest value, another conflict remains. With a8 = 5°"), "{further}");

@@ -32,7 +32,7 @@ pub(super) fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
         of_legs(cycle, over("Torso lean", &[(Leg::Right, 0)]), torso, torso),
     ];
     let hint = format!(
-        "Flexion, dorsiflexion and forward lean are positive. Reference gait: {}. {} There is no reference for the joints of the prosthesis.",
+        "Flexion, dorsiflexion and forward lean are positive. Torso lean is drawn over the cycle of each leg. Reference gait: {}. {} There is no reference for the joints of the prosthesis.",
         reference.name,
         band_in_words(reference)
     );

@@ -107,15 +107,11 @@ pub(crate) fn maps(
         let dimension = &space.dimensions()[place];
         (format!("{}: {}", dimension.name, meaning(&dimension.name)), dimension.values.clone())
     };
-    let draw = |title: &str, cells, range, in_percent| {
+    let draw = |title: &str, cells, range| {
         let group = format!("{} {}", space.dimensions()[right].name, space.dimensions()[down].name);
-        Figure::map(
-            &group,
-            HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range, in_percent },
-        )
+        Figure::map(&group, HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range })
     };
-    let figures =
-        vec![draw("Utility", utility, range, false), draw("Probability of converging", converging, (0.0, 1.0), true)];
+    let figures = vec![draw("Utility", utility, range), draw("Probability of converging", converging, (0.0, 1.0))];
     Ok(Maps { dimensions, held, figures })
 }
 

@@ -79,12 +79,28 @@ struct GaitRow {
 struct MainEffectRow {
     name: String,
     limited: &'static str,
-    /// Share of the largest effect.
-    share: f64,
+    bar: EffectBar,
     effect: String,
     best: f64,
     worst: f64,
     is_distinguishable: bool,
+}
+
+/// A main effect as a bar with its standard deviation, in the units of the drawing.
+struct EffectBar {
+    zero: f64,
+    mean: f64,
+    low: f64,
+    high: f64,
+}
+
+impl EffectBar {
+    /// Width of the drawing; the template has the same.
+    const WIDTH: f64 = 120.0;
+
+    fn width(&self) -> f64 {
+        (self.mean - self.zero).max(0.0)
+    }
 }
 
 struct SurprisingAnswerRow {
@@ -201,14 +217,27 @@ fn worse_by_utility(behind: &Prediction) -> String {
 fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
     let dimensions = analysis.posterior.space().dimensions();
     let ranked = MainEffect::ranked(&analysis.main_effects);
-    let largest = ranked.first().map_or(0.0, |place| analysis.main_effects[*place].difference.mean);
+    let ends = |side: f64| {
+        let end = move |place: &usize| {
+            let difference = &analysis.main_effects[*place].difference;
+            difference.mean + side * difference.standard_deviation
+        };
+        ranked.iter().map(end)
+    };
+    let (low, high) = (ends(-1.0).fold(0.0, f64::min), ends(1.0).fold(0.0, f64::max));
+    let at = |value: f64| EffectBar::WIDTH * (value - low) / (high - low).max(f64::MIN_POSITIVE);
     let row = |place: usize| {
         let effect = &analysis.main_effects[place];
         let name = &dimensions[place].name;
         MainEffectRow {
             limited: meaning(name),
             name: name.clone(),
-            share: if largest > 0.0 { effect.difference.mean / largest } else { 0.0 },
+            bar: EffectBar {
+                zero: at(0.0),
+                mean: at(effect.difference.mean),
+                low: at(effect.difference.mean - effect.difference.standard_deviation),
+                high: at(effect.difference.mean + effect.difference.standard_deviation),
+            },
             effect: format!("{:.2} ± {:.2}", effect.difference.mean, effect.difference.standard_deviation),
             best: effect.best,
             worst: effect.worst,

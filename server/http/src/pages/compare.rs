@@ -3,6 +3,7 @@
 use super::compare_answer::{AnswerForm, AnswerOutcome, LABELS, give};
 use super::page_chart::{PageChart, shared_legend};
 use super::saved_answer::SavedAnswer;
+use super::study::{AnswerRow, answers};
 use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
 use crate::accessible::Id;
@@ -24,13 +25,16 @@ use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::MANY;
 use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
+use gaitwright_service::studies::recorded_answer::RecordedAnswer;
 use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_service::studies::unanswered_pair::{first_without_answer, unanswered_pairs};
 use gaitwright_service::studies::undo;
 use gaitwright_service::studies::walkable;
 use gaitwright_store::feedback::Source;
 use gaitwright_store::studies::{Study, StudyState};
 use gaitwright_store::{
-    AnswerId, FeedbackId, StudyId, TrialId, commit, events, gaits, reference_gaits, studies, trials,
+    AnswerId, Connection, FeedbackId, StudyId, TrialId, assessments, commit, events, gaits, reference_gaits, studies,
+    trials,
 };
 use serde::Deserialize;
 use std::str::FromStr;
@@ -64,6 +68,8 @@ struct ComparePage {
     changes: bool,
     /// Whether the study waits for an answer.
     waits: bool,
+    /// Whether the visitor chose the gaits.
+    is_chosen: bool,
     /// How many gaits can be compared once they are certified.
     being_certified: usize,
     /// Whether the study computes another gait.
@@ -72,7 +78,22 @@ struct ComparePage {
     typed: AnswerForm,
     /// The signed-in user; empty without sign-in.
     user: String,
-    refused: Option<String>,
+    refused: Option<Refusal>,
+    /// The answers so far, if every pair has one.
+    answers: Vec<AnswerRow>,
+}
+
+/// Why a form was refused.
+struct Refusal {
+    why: String,
+    /// Whether the same answer would be refused again, so that the page does not offer it.
+    is_final: bool,
+}
+
+impl Refusal {
+    fn correctable(why: String) -> Self {
+        Self { why, is_final: false }
+    }
 }
 
 impl ComparePage {
@@ -85,6 +106,14 @@ impl ComparePage {
     /// Safety reports.
     const UNSAFE: [(&str, &str); 3] =
         [("unsafe_a", "Gait A is unsafe"), ("unsafe_b", "Gait B is unsafe"), ("unsafe_both", "Both gaits are unsafe")];
+
+    /// Whether the page asks about its gaits, and does not only say what was saved.
+    fn asks(&self) -> bool {
+        match &self.refused {
+            Some(refused) => !refused.is_final,
+            None => self.saved.is_none() || self.changes || self.waits || self.is_chosen,
+        }
+    }
 
     /// The gait at a place, if it can be drawn.
     #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
@@ -140,7 +169,7 @@ pub(super) async fn get(
         (typed.author, typed.source) = (user.clone(), Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
-        let refused = "Gait A and gait B are the same. Choose two different gaits.".to_owned();
+        let refused = Refusal::correctable("Gait A and gait B are the same. Choose two different gaits.".to_owned());
         return Box::pin(show(&mut app, id, GaitsQuery { a: None, b: None, ..choice }, (user, typed), Some(refused)))
             .await;
     }
@@ -157,7 +186,7 @@ async fn show(
     id: StudyId,
     choice: GaitsQuery,
     (user, typed): (String, AnswerForm),
-    refused: Option<String>,
+    refused: Option<Refusal>,
 ) -> PageResult {
     let mut reader = app.read().await?;
     let last_event = events::last(&mut reader, id).await?;
@@ -183,12 +212,15 @@ async fn show(
             }
             None => (false, choice, typed),
         };
+    let assessments = assessments::of_study(&mut reader, id).await?;
     drop(reader);
+    let person = Some(typed.author.trim().to_owned()).filter(|author| !author.is_empty());
     let ask = move |pool: &OnPool| {
         let pending = if large { Ok(PendingComparison::None) } else { awaited_comparison(pool, &snapshot) };
-        (snapshot, pending)
+        let unanswered = unanswered_pairs(pool, &snapshot, &assessments, person.as_deref());
+        (snapshot, assessments, pending, unanswered, person)
     };
-    let (snapshot, pending) = app.compute(ask).await.map_err(Error::from)?;
+    let (snapshot, assessments, pending, unanswered, person) = app.compute(ask).await.map_err(Error::from)?;
     let pending = pending.map_err(Error::Learner)?.trials();
     let mut reader = app.read().await?;
     let waits = pending.is_some();
@@ -204,17 +236,22 @@ async fn show(
         .filter(|trial| snapshot.walkable(trial).is_ok())
         .map(|trial| OfferedGait { id: trial.id, number: trial.number, as_a: false, as_b: false })
         .collect();
+    // After an undo the gaits come from the answer, and may have been reported as unsafe since.
     if refused.is_none()
+        && saved.is_none()
         && let (Some(a), Some(b)) = (choice.a, choice.b)
     {
         walkable::admit_pair(&mut reader, id, ("a", "b"), (a, b)).await?;
     }
-    let newest = |back: usize| trials.len().checked_sub(back).map(|i| trials[i].id);
     let (a, b) = match (choice.a, choice.b, pending) {
         (Some(a), Some(b), _) => (Some(a), Some(b)),
         (_, _, Some((new, old))) => (Some(old), Some(new)),
-        _ => (newest(2), newest(1)),
+        _ => {
+            let found = first_without_answer(&mut reader, &snapshot, &unanswered, person.as_deref()).await?;
+            found.map(|pair| pair.trials()).unzip()
+        }
     };
+    let answers = if a.is_none() { answers(&snapshot, &assessments) } else { Vec::new() };
     for trial in &mut trials {
         (trial.as_a, trial.as_b) = (a == Some(trial.id), b == Some(trial.id));
     }
@@ -250,12 +287,14 @@ async fn show(
         saved,
         changes,
         waits,
+        is_chosen: choice.a.is_some() && choice.b.is_some(),
         being_certified,
         is_going_on,
         last_event,
         typed,
         user,
         refused,
+        answers,
     })
 }
 
@@ -272,12 +311,12 @@ pub(super) async fn post(
         }
         Ok(AnswerOutcome::SameForm(saved)) => {
             let why = "This form was already sent with another answer, shown above. That answer counts; this one was not \
-                       saved. To change it, choose Change in the list of answers of the study.";
+                       saved.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Ok(AnswerOutcome::AnsweredBefore(saved)) => {
             let why = "You have already answered this comparison, perhaps in another tab or window. Your first answer, shown \
-                       above, counts; this one was not saved. To change it, choose Change in the list of answers of the study.";
+                       above, counts; this one was not saved.";
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
@@ -288,7 +327,8 @@ pub(super) async fn post(
     let change = form.changed().ok().flatten();
     let choice = GaitsQuery { a: form.a.parse().ok(), b: form.b.parse().ok(), saved, change };
     let typed = (user_of(&authorized.caller), form);
-    Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(why))).await?).into_response())
+    let refused = Refusal { why, is_final: status == StatusCode::CONFLICT };
+    Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(refused))).await?).into_response())
 }
 
 /// The form to undo an answer.
@@ -309,22 +349,35 @@ pub(super) async fn undo(
     let mut writer = app.write().await?;
     // A form that is sent twice (double click, lost response) counts once.
     if let Some(shown) = undo::outcome(&mut writer, id, saved).await? {
-        return Ok(Redirect::to(&format!("/studies/{id}/compare?saved={shown}")).into_response());
+        return after_undo(&mut writer, id, saved, shown).await;
     }
     match undo::undo(&mut writer, caller, Some(id), saved, Some(&form.author)).await {
         Ok(restored) => {
+            let next = after_undo(&mut writer, id, saved, restored.unwrap_or(saved)).await?;
             commit(writer).await?;
             app.scheduler.changed();
-            let shown = restored.unwrap_or(saved);
-            Ok(Redirect::to(&format!("/studies/{id}/compare?saved={shown}")).into_response())
+            Ok(next)
         }
         Err(error @ Error::CannotBeUndone(_)) => {
             drop(writer);
             let choice = GaitsQuery { saved: Some(saved), ..GaitsQuery::default() };
             let typed = (user_of(caller), AnswerForm::default());
-            let shown = Box::pin(show(&mut app, id, choice, typed, Some(error.to_string()))).await?;
+            let refused = Refusal::correctable(error.to_string());
+            let shown = Box::pin(show(&mut app, id, choice, typed, Some(refused))).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }
         Err(other) => Err(other.into()),
     }
+}
+
+/// Where an undo leads: back to the two gaits, unless an earlier answer about them counts again.
+async fn after_undo(
+    db: &mut Connection,
+    study: StudyId,
+    undone: AnswerId,
+    shown: AnswerId,
+) -> Result<Response, PageError> {
+    let pair = RecordedAnswer::get(db, Some(study), undone).await?.pair().filter(|_| shown == undone);
+    let gaits = pair.map_or_else(String::new, |(a, b)| format!("&a={a}&b={b}"));
+    Ok(Redirect::to(&format!("/studies/{study}/compare?saved={shown}{gaits}")).into_response())
 }

@@ -14,7 +14,7 @@ use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Rate, Read, RequiredRight, Run, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
-use gaitwright_store::studies::{Study, StudyFilter, StudyState};
+use gaitwright_store::studies::{AnswerSource, Study, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
 use serde::Deserialize;
@@ -124,6 +124,11 @@ struct HomeRow {
 }
 
 impl HomeRow {
+    /// Whether people choose the gait, so that the lowest Gait RMSE may belong to another one.
+    fn people_decide(&self) -> bool {
+        self.study.plan.answer_source != AnswerSource::GaitRmse
+    }
+
     /// The class of the state: a study that finished without a gait does not look like a success.
     fn state_class(&self) -> &'static str {
         if is_without_gait(self.study.state, self.counts) { "without_gait" } else { self.study.state.as_str() }

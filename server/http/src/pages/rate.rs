@@ -45,6 +45,8 @@ struct RatePage {
     not_blind: bool,
     /// The caller signed in with a one-time link, and has no password.
     no_password: bool,
+    /// Whether the caller signed in, and so can sign out.
+    signed_in: bool,
 }
 
 impl RatePage {
@@ -179,6 +181,7 @@ pub(super) async fn list(
         saved,
         not_blind,
         no_password,
+        signed_in: authorized.caller.user.is_some(),
     })
 }
 

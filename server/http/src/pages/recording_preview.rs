@@ -14,6 +14,8 @@ use gaitwright_service::studies::reference_preview::ReferencePreview;
 pub(super) struct RecordingPreview {
     /// Why the recording would be refused.
     pub(super) refused: Option<String>,
+    /// A doubt about a recording that would be accepted.
+    pub(super) warning: Option<String>,
     /// The legend of the charts, if they share it.
     pub(super) legend: Vec<(String, String)>,
     pub(super) charts: Vec<PageChart>,
@@ -44,6 +46,7 @@ impl RecordingPreview {
         };
         Self {
             refused: None,
+            warning: None,
             legend: shared_legend(&mut charts),
             charts,
             strides: strides.iter().enumerate().map(row).collect(),
@@ -104,10 +107,13 @@ impl RecordingPreview {
         let usage = |place: usize| {
             if preview.strides[place].is_used { "used" } else { "left out: too short, too long, or with a gap" }
         };
-        let (mean, refused) = match &preview.reference {
-            Ok(found) => (gait_charts::of_reference(found).iter().map(PageChart::new).collect(), None),
-            Err(error) => (Vec::new(), Some(form_errors::in_words(error))),
+        let (mean, refused, warning) = match &preview.reference {
+            Ok(found) => {
+                let charts = gait_charts::of_reference(found).iter().map(PageChart::new).collect();
+                (charts, None, found.warning().ok().flatten())
+            }
+            Err(error) => (Vec::new(), Some(form_errors::in_words(error)), None),
         };
-        Self { refused, mean, ..Self::new(&charts, &strides, usage) }
+        Self { refused, warning, mean, ..Self::new(&charts, &strides, usage) }
     }
 }

@@ -18,7 +18,7 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
-use gaitwright_store::studies::{Study, StudyFilter};
+use gaitwright_store::studies::{AnswerSource, Study, StudyFilter};
 use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -54,6 +54,8 @@ struct Compared {
     b: Study,
     /// Whether the studies have the same reference gait; otherwise no Gait RMSE is shown.
     comparable: bool,
+    /// Whether people answer in both studies, so that Gait RMSE does not rank their gaits.
+    people_decide: bool,
     chart: Option<PageChart>,
     /// Names of studies without a best action to draw.
     without_course: Vec<String>,
@@ -139,14 +141,14 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
         ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.number_of_trials)),
         ("Converged".to_owned(), study.counts.converged.to_string()),
         ("Total solve time, s".to_owned(), format!("{seconds:.0}")),
-        ("Best trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
+        ("Recommended trial".to_owned(), best.map_or_else(|| "–".to_owned(), |trial| trial.number.to_string())),
     ];
     if comparable {
         let rmse = best.and_then(|trial| trial.gait_rmse_rad);
-        rows.push(("Gait RMSE of the best trial, rad".to_owned(), format::decimal(rmse)));
+        rows.push(("Gait RMSE of the recommended trial, rad".to_owned(), format::decimal(rmse)));
     }
     let cost = best.and_then(|trial| trial.cost_of_transport);
-    rows.push(("Cost of transport of the best trial".to_owned(), format::decimal(cost)));
+    rows.push(("Cost of transport of the recommended trial".to_owned(), format::decimal(cost)));
     let bounds = best.map(|trial| trial.action.to_array());
     for (place, name) in TunedBounds::NAMES.iter().enumerate() {
         let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
@@ -164,7 +166,8 @@ fn compare(
     let (of_a, of_b) = (a.outcome(pool, analyses)?, b.outcome(pool, analyses)?);
     let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
     let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
-    let chart = if comparable { course(&both) } else { None };
+    let people_decide = both.iter().all(|(snapshot, _)| snapshot.study.plan.answer_source == AnswerSource::People);
+    let chart = if comparable && !people_decide { course(&both) } else { None };
     let chart = chart.map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
         PageChart::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
@@ -177,6 +180,7 @@ fn compare(
         rows: properties.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
         without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
         comparable,
+        people_decide,
         chart,
         a: a.snapshot.study,
         b: b.snapshot.study,

@@ -39,6 +39,8 @@ struct SystemPage {
     scheduled: Option<Scheduled>,
     queued: u32,
     running: u32,
+    /// Numbers of running and queued jobs that follow solves.
+    other_jobs: [usize; 2],
     oldest_queued: String,
     totals: Totals,
     free_bytes: Option<u64>,
@@ -155,6 +157,8 @@ async fn show(app: &AppState, caller: &Caller, backup: Option<BackupNotice>) -> 
         backup,
         queued,
         running,
+        other_jobs: [JobState::Running, JobState::Queued]
+            .map(|state| app.scheduler.jobs_after_solves().iter().filter(|(_, _, own)| *own == state).count()),
         oldest_queued: duration(totals.oldest_queued_seconds),
         totals,
         free_bytes: app.store().free_bytes(),

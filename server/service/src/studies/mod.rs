@@ -81,6 +81,7 @@ pub mod trial_choice;
 mod trial_jobs;
 pub mod trial_result;
 pub mod trial_transitions;
+pub mod unanswered_pair;
 pub mod undo;
 pub mod utility_history;
 mod walk_simulator;

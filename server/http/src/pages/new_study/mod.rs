@@ -31,7 +31,9 @@ use gaitwright_store::devices::Device;
 use gaitwright_store::reference_gaits::ReferenceGait;
 use gaitwright_store::studies::{self, Study, StudyPlan};
 use gaitwright_store::subjects::{self, Subject};
-use gaitwright_store::{Connection, StudyId, SubjectId, commit, consents, devices, members, reference_gaits, trials};
+use gaitwright_store::{
+    Connection, StoreError, StudyId, SubjectId, commit, consents, devices, members, reference_gaits, trials,
+};
 use serde::{Deserialize, Serialize};
 
 /// The choices of the form, and measured solve times.
@@ -71,6 +73,8 @@ struct NewStudyPage {
     cloned: Option<Study>,
     /// The chosen reference gait, as a part of the page; empty if none is known yet.
     reference: String,
+    /// Why the chosen subject is not in the list; empty if it is.
+    not_offered: String,
 }
 
 impl NewStudyPage {
@@ -195,9 +199,28 @@ async fn show(
         Some(plan) => ReferenceChoice::read(&mut reader, &plan).await?.shown()?,
         None => String::new(),
     };
+    let not_offered = not_offered(&mut reader, &offered.subjects, &fields.subject).await?;
     drop(reader);
     let editor = SpaceEditor::typed(&fields.space)?;
-    page(&NewStudyPage { units, offered, learners: &LEARNERS, fields, editor, refused, cloned, reference })
+    page(&NewStudyPage { units, offered, learners: &LEARNERS, fields, editor, refused, cloned, reference, not_offered })
+}
+
+/// Why the chosen subject cannot have a new study. Empty if it can, and if none is chosen.
+async fn not_offered(db: &mut Connection, offered: &[Subject], chosen: &str) -> Result<String, Error> {
+    let Ok(id) = chosen.parse::<SubjectId>() else { return Ok(String::new()) };
+    if offered.iter().any(|subject| subject.id == id) {
+        return Ok(String::new());
+    }
+    Ok(match subjects::get(db, id).await {
+        Ok(subject) => {
+            format!(
+                "Subject {} withdrew consent and cannot have new studies. Choose another subject.",
+                subject.pseudonym
+            )
+        }
+        Err(StoreError::Missing { .. }) => "The chosen subject does not exist. Choose another one.".to_owned(),
+        Err(other) => return Err(other.into()),
+    })
 }
 
 /// `POST /studies/new`.

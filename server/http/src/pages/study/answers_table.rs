@@ -9,22 +9,22 @@ use gaitwright_store::{AnswerId, Instant};
 use std::cmp::Reverse;
 
 /// An answer.
-pub(super) struct AnswerRow {
-    pub(super) text: String,
+pub(crate) struct AnswerRow {
+    pub(crate) text: String,
     /// Source and author.
-    pub(super) by: String,
-    pub(super) note: String,
+    pub(crate) by: String,
+    pub(crate) note: String,
     /// Why it no longer counts.
-    pub(super) undone: Option<String>,
+    pub(crate) undone: Option<String>,
     /// `change` of the comparison page that can change it.
-    pub(super) saved: Option<AnswerId>,
+    pub(crate) saved: Option<AnswerId>,
     /// Whether it counts again because a change to it was undone.
-    pub(super) restored: bool,
-    pub(super) at: Instant,
+    pub(crate) restored: bool,
+    pub(crate) at: Instant,
 }
 
 /// Answers of users and subjects, newest first. Those of Gait RMSE follow from the table of trials.
-pub(super) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRow> {
+pub(crate) fn answers(snapshot: &StudySnapshot, assessments: &[Assessment]) -> Vec<AnswerRow> {
     let of_assessment = |id| assessments.iter().any(|assessment| assessment.feedback_id == Some(id));
     let by_people = |row: &&FeedbackRow| !matches!(row.source, Source::GaitRmse | Source::Evaluation);
     let why = |retraction: &Option<Retraction>| Some(format!("retracted: {}", retraction.as_ref()?.reason));

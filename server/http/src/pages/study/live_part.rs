@@ -1,6 +1,7 @@
 //! The part of the study page that changes while the study runs.
 
 use super::answers_table::{AnswerRow, answers};
+use super::best_gait::{BestFindings, BestGait};
 use super::recommended_walker::RecommendedGait;
 use super::state_buttons::{TransitionButton, button};
 use super::time_left::time_left;
@@ -8,7 +9,7 @@ use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use super::without_gait::TrialsWithoutGait;
 use crate::AppState;
 use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
-use crate::format::{self, Bound};
+use crate::format;
 use crate::pages::certainty::certainty;
 use crate::pages::page_chart::PageChart;
 use askama::Template;
@@ -20,17 +21,14 @@ use gaitwright_service::access::{Caller, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::actions_with_known_gait::never_active;
 use gaitwright_service::studies::analysis::{Analyses, too_large_to_wait};
-use gaitwright_service::studies::certified_best::{self, BestCertification, CertificateState};
-use gaitwright_service::studies::execution;
+use gaitwright_service::studies::certified_best;
 use gaitwright_service::studies::lifecycle::{self, StudyTransition, transitions_for_people};
 use gaitwright_service::studies::reported_gait::ReportedGait;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::workers::Track;
 use gaitwright_store::studies::{AnswerSource, Study, StudyState};
 use gaitwright_store::trials::{Trial, TrialCounts, TrialState};
-use gaitwright_store::{
-    Instant, StudyId, TrialId, assessments, explanations, feedback, gaits, solve_jobs, studies, trials,
-};
+use gaitwright_store::{Instant, StudyId, TrialId, assessments, explanations, feedback, solve_jobs, studies, trials};
 use std::sync::Arc;
 
 /// The part that changes while the study runs.
@@ -93,6 +91,11 @@ impl Live {
         self.unsafe_gaits.is_empty() && !self.comparison_pending && self.study.state.has_ended()
     }
 
+    /// Whether the study finished with all its trials, as the numbers of trials say already.
+    fn has_every_result(&self) -> bool {
+        self.study.state == StudyState::Finished && self.counts.results() >= self.study.plan.number_of_trials
+    }
+
     /// Whether answers are missing from the list.
     fn has_more_answers(&self) -> bool {
         self.answers.len() >= ANSWERS
@@ -113,44 +116,6 @@ pub(super) struct RunningRow {
     pub(super) number: u32,
     pub(super) text: String,
     pub(super) chart: Option<PageChart>,
-}
-
-struct BestGait {
-    id: TrialId,
-    number: u32,
-    rmse: String,
-    cost: String,
-    bounds: Vec<Bound>,
-    has_gait: bool,
-    /// Whether a script evaluated it and reported values only.
-    by_script: bool,
-    /// The state of its certificate.
-    certification: BestCertification,
-    /// How many simulated walks with it were complete; `None` if none were simulated.
-    simulated_walks: Option<String>,
-    /// If it failed, the best trial whose gait passed.
-    passing: Option<Passing>,
-}
-
-impl BestGait {
-    fn failed(&self) -> bool {
-        self.certification.certificate == CertificateState::Failed
-    }
-
-    fn passed(&self) -> bool {
-        self.certification.certificate == CertificateState::Passed
-    }
-
-    fn is_being_certified(&self) -> bool {
-        self.certification.certificate == CertificateState::BeingCertified
-    }
-}
-
-/// A trial whose gait passed its certificate.
-struct Passing {
-    id: TrialId,
-    number: u32,
-    rmse: String,
 }
 
 /// A gait that was reported as unsafe.
@@ -197,19 +162,16 @@ pub(super) async fn read_live(
     let (snapshot, learned) = app.compute(draw).await?;
     let Learned { outcome, certainty, utility } = learned.map_err(Error::Learner)?;
     let mut reader = app.read().await?;
-    let mut certification = certified_best::of_ranking(&mut reader, &outcome.ranking).await?;
-    let without_gait = TrialsWithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
-    let has_gait = match outcome.best {
-        Some(best) => gaits::exists(&mut reader, best).await?,
-        None => false,
-    };
-    let simulated_walks = match outcome.best {
-        Some(best) => execution::newest(&mut reader, best).await?.map(|kept| kept.reported.report.sentence()),
-        None => None,
-    };
+    let certification = certified_best::of_ranking(&mut reader, &outcome.ranking).await?;
+    let mut without_gait = TrialsWithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
+    if let Some(without) = without_gait.as_mut().filter(|_| counts.converged == 0) {
+        let explained = explanations::find(&mut reader, without.instance.0).await?;
+        without.conflict = explained.and_then(|made| made.explanation.headline()).unwrap_or_default();
+    }
+    let mut best = BestFindings::read(&mut reader, outcome.best, certification).await?;
     drop(reader);
-    if let Some(next) = certification.without_certificate {
-        certification.certified_by_service(app.scheduler.is_certifying(id, next));
+    if let Some(next) = best.certification.without_certificate {
+        best.certification.certified_by_service(app.scheduler.is_certifying(id, next));
     }
     let running = snapshot
         .trials
@@ -220,7 +182,7 @@ pub(super) async fn read_live(
     let mut answers = answers(&snapshot, &assessments);
     answers.truncate(ANSWERS);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
-    let found = StudyFindings { outcome, certainty, utility, certification, simulated_walks, has_gait, without_gait };
+    let found = StudyFindings { outcome, certainty, utility, best, without_gait };
     let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
     // A large study shows only its newest trials, so whether a bound was ever active is unknown.
     let inactive = if large { Vec::new() } else { never_active(&snapshot) };
@@ -271,17 +233,12 @@ pub(super) fn running_row(trial: &Trial, track: Option<&Track>) -> RunningRow {
     }
 }
 
-/// The results of a study, and the certificates, simulated walks and stored trajectory of its best gait.
+/// The results of a study, and what is known of its best gait.
 struct StudyFindings {
     outcome: StudyOutcome,
     certainty: Option<String>,
     utility: Option<Figure>,
-    /// The states of the certificates.
-    certification: BestCertification,
-    /// How many simulated walks with the best gait were complete.
-    simulated_walks: Option<String>,
-    /// Whether the trajectory of the best gait is stored.
-    has_gait: bool,
+    best: BestFindings,
     without_gait: Option<TrialsWithoutGait>,
 }
 
@@ -294,23 +251,8 @@ fn view(
     answers: Vec<AnswerRow>,
     may_run: bool,
 ) -> Live {
-    let StudyFindings { outcome, certainty, utility, certification, simulated_walks, has_gait, without_gait } = found;
-    let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| BestGait {
-        id: trial.id,
-        number: trial.number,
-        rmse: format::decimal(trial.gait_rmse_rad),
-        cost: format::decimal(trial.cost_of_transport),
-        bounds: format::bounds(&trial.action),
-        has_gait,
-        by_script: trial.script.is_some(),
-        passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| Passing {
-            id: trial.id,
-            number: trial.number,
-            rmse: format::decimal(trial.gait_rmse_rad),
-        }),
-        certification: certification.clone(),
-        simulated_walks,
-    });
+    let StudyFindings { outcome, certainty, utility, best, without_gait } = found;
+    let best = outcome.best.and_then(|id| snapshot.trial(id)).map(|trial| best.of(trial, &snapshot));
     let unsafe_gait = |report: &ReportedGait| {
         let number = snapshot.trial(report.trial)?.number;
         let reviewed = report.review.is_some();

@@ -1,6 +1,7 @@
 //! The study page, kept current by events.
 
 mod answers_table;
+mod best_gait;
 mod live_part;
 mod recommended_walker;
 mod state_buttons;
@@ -8,7 +9,7 @@ mod time_left;
 mod trials_table;
 mod without_gait;
 
-pub(super) use self::answers_table::{answer_in_words, assessment_in_words};
+pub(super) use self::answers_table::{AnswerRow, answer_in_words, answers, assessment_in_words};
 use self::live_part::{RunningRow, read_live, running_row};
 pub(super) use self::state_buttons::post;
 use self::trials_table::TrialsQuery;
@@ -33,7 +34,7 @@ use gaitwright_store::studies::Study;
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{
-    LabSessionId, StudyId, TrialId, consents, events, lab_sessions, reference_gaits, studies, trials,
+    Instant, LabSessionId, StudyId, TrialId, consents, events, lab_sessions, now, reference_gaits, studies, trials,
 };
 
 #[derive(Template)]
@@ -55,6 +56,8 @@ struct StudyPage {
     variant: &'static str,
     answer_source: &'static str,
     may_administer: bool,
+    /// The time of this page, for a print.
+    as_of: Instant,
     /// Imports; empty if the study was created here.
     imports: Vec<Import>,
 }
@@ -117,6 +120,7 @@ pub(super) async fn get(
         variant,
         answer_source,
         may_administer,
+        as_of: now(),
         imports,
     })
 }

@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 /// A sentence about the trials without a gait, and an example.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TrialsWithoutGait {
+    /// The conflict in words, for a study without any gait; empty if it is unknown.
+    pub(super) conflict: String,
     /// The sentence.
     pub(super) reason: String,
     /// One of these trials: identifier and number.
@@ -21,10 +23,13 @@ impl TrialsWithoutGait {
         let explained = common.explained;
         if let Some(Relief { bound, trials, instance }) = &common.relief {
             let limited = TunedBounds::quantity_of(bound);
-            let reason = format!(
-                "In {trials} of the {explained} trials with an explanation, relaxing {bound} ({limited}) alone gives a gait."
-            );
-            return Some(Self { reason, instance: *instance });
+            let relaxing = format!("elaxing {bound} ({limited}) alone gives a gait");
+            let reason = match explained {
+                1 => format!("R{relaxing}."),
+                _ if *trials == explained => format!("In all {explained} trials with an explanation, r{relaxing}."),
+                _ => format!("In {trials} of the {explained} trials with an explanation, r{relaxing}."),
+            };
+            return Some(Self { conflict: String::new(), reason, instance: *instance });
         }
         let (mut missed, mut all): (BTreeMap<&str, Vec<&Trial>>, usize) = (BTreeMap::new(), 0);
         for trial in trials.iter().filter(|trial| trial.state == TrialState::NotConverged) {
@@ -37,12 +42,20 @@ impl TrialsWithoutGait {
         let newest = most.last()?;
         let alone = match explained {
             0 => String::new(),
+            1 => " Relaxing a single bound gives no gait in the trial with an explanation.".to_owned(),
             _ => {
                 format!(" Relaxing a single bound gives no gait in any of the {explained} trials with an explanation.")
             }
         };
-        let reason =
-            format!("{constraint} has the largest violation in {} of {all} trials without a gait.{alone}", most.len());
-        Some(Self { reason, instance: (newest.id, newest.number) })
+        let reason = match (most.len(), all) {
+            (_, 1) => format!("{constraint} has the largest violation.{alone}"),
+            (same, all) if same == all => {
+                format!("{constraint} has the largest violation in all {all} trials without a gait.{alone}")
+            }
+            (some, all) => {
+                format!("{constraint} has the largest violation in {some} of {all} trials without a gait.{alone}")
+            }
+        };
+        Some(Self { conflict: String::new(), reason, instance: (newest.id, newest.number) })
     }
 }

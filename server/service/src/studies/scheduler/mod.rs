@@ -187,7 +187,7 @@ impl Scheduler {
     }
 
     /// The certificates, explanations and execution reports that are queued or running, with their trials.
-    pub(super) fn jobs_after_solves(&self) -> Vec<(JobId, TrialId, JobState)> {
+    pub fn jobs_after_solves(&self) -> Vec<(JobId, TrialId, JobState)> {
         self.0.after_solves.as_ref().map(JobsAfterSolves::open).unwrap_or_default()
     }
 
