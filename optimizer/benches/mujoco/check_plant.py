@@ -80,6 +80,7 @@ def energy_change_in_flight(gait: Gait, step_s: float) -> float:
     """Relative change of the energy in 0.2 s of flight without torques."""
     model = model_of(gait)
     model.opt.timestep = step_s
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = POSTURE, RATES
     mujoco.mj_forward(model, data)

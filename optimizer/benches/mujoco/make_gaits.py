@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tuned_gait import tune
+
 # Table I of the paper.
 LEVELS: dict[str, tuple[float, ...]] = {
     "a1": (15, 20),
@@ -48,21 +50,6 @@ def solve(program: str, out: Path, subject: int, options: list[str]) -> None:
         unfinished.rename(out)
 
 
-def tune(program: str, folder: Path, subject: int, seed: int) -> None:
-    """Tunes for ten trials and solves the action of the best trial again from its warm start."""
-    result = folder / f"tune-{subject}-{seed}.json"
-    if result.exists():
-        return
-    database = folder / f"tune-{subject}-{seed}.db"
-    options = ["--subject", str(subject), "--trials", "10", "--seed", str(seed), "--workers", "1"]
-    done = subprocess.run(
-        [program, "tune", *options, "--database", str(database), "--json"], capture_output=True, text=True, check=False
-    )
-    if done.returncode == 0:
-        result.write_text(done.stdout)
-    print(result.stem, done.returncode, flush=True)
-
-
 def main() -> None:
     program, folder = sys.argv[1], Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
@@ -79,7 +66,7 @@ def main() -> None:
             solve(program, folder / f"random-{subject}-{number + 1:02}.json", subject, ["--bounds", action])
     for seed in (1, 2, 3):
         for subject in (1, 2):
-            tune(program, folder, subject, seed)
+            tune(program, folder / f"tuned-{subject}-{seed}.json", subject, seed)
 
 
 if __name__ == "__main__":

@@ -72,9 +72,7 @@ def mjcf(walker: Walker, ankle_range_rad: tuple[float, float], contact: Contact)
     )
     return f"""<mujoco>
       <compiler angle="radian" autolimits="false"/>
-      <option gravity="0 0 {-GRAVITY}" timestep="{contact.step_s}" cone="elliptic" impratio="10">
-        <flag energy="enable"/>
-      </option>
+      <option gravity="0 0 {-GRAVITY}" timestep="{contact.step_s}" cone="elliptic" impratio="10"/>
       <default><joint type="hinge"/><geom contype="0" conaffinity="0"/></default>
       <worldbody>
         {planes}
