@@ -1,19 +1,22 @@
 """Walks with the same gaits in MuJoCo and in `gaitwright simulate`, and how well both agree on the order of the gaits.
 
-    python compare_plants.py PROGRAM FOLDER [WALKS]
+    python compare_plants.py PROGRAM FOLDER [--contact documented] [--walks 10] [--walks-in-gaitwright 50]
 
-The results of each gait are kept in FOLDER/results, so the command continues after a stop.
+Walks are kept in FOLDER/walks: the command continues after a stop, and more walks in MuJoCo extend those that are there.
 """
 
+import argparse
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from disturbances import random, undisturbed
-from gait_file import read_gait
+from gait_file import Gait, read_gait
 from rank_correlation import spearman
 from simulated_walk import Outcome, SimulatedWalker
 from walker_model import DEFAULT, DOCUMENTED, Contact
@@ -21,92 +24,129 @@ from walker_model import DEFAULT, DOCUMENTED, Contact
 STRIDES = 20
 SEED = 7
 GROUNDS_MM = (0, 5)
-PLANTS = ("gaitwright", "documented", "default")
+CONTACTS = {"documented": DOCUMENTED, "default": DEFAULT}
+# Largest difference of a coordinate by which two files have the same gait, m or rad.
+SAME_GAIT = 1e-3
+# Mean strides on level ground in Gaitwright up to which a gait falls early.
+EARLY_STRIDES = 3.0
 
-# Mean strides and share of complete walks on each ground, and strides of the undisturbed walk.
-Result = dict[str, float]
+
+@dataclass(frozen=True)
+class OnGround:
+    """Walks of a gait on one ground: mean strides, and the share of complete walks."""
+
+    strides: float
+    share: float
 
 
-def in_mujoco(gait_file: Path, contact: Contact, walks: int) -> Result:
+Results = dict[str, dict[int, OnGround]]
+
+
+def is_same(a: Gait, b: Gait) -> bool:
+    """Whether two gaits are one: bounds that are not active do not change a gait."""
+    pairs = zip(a.domains, b.domains, strict=True)
+    return a.height_m == b.height_m and all(np.abs(x.q - y.q).max() < SAME_GAIT for x, y in pairs)
+
+
+def distinct(folder: Path) -> list[Path]:
+    """The files of the reported gaits, the first one of each gait."""
+    kept: list[tuple[Path, Gait]] = []
+    for file in sorted(folder.glob("*.json")):
+        if file.stem.startswith("development"):
+            continue
+        gait = read_gait(file)
+        same = [other.stem for other, known in kept if is_same(gait, known)]
+        if same:
+            print(f"{file.stem} has the gait of {same[0]}")
+        else:
+            kept.append((file, gait))
+    return [file for file, _ in kept]
+
+
+def in_mujoco(file: Path, contact: Contact, name: str, ground_mm: int, walks: int) -> OnGround:
     """Walks of a gait in MuJoCo."""
-    walker = SimulatedWalker(read_gait(gait_file), contact)
-    result: Result = {"undisturbed": walker.walk(undisturbed(), STRIDES).strides}
-    for ground_mm in GROUNDS_MM:
-        outcomes: list[Outcome] = []
-        for number in range(walks):
-            pushed_within_s = 0.5 * STRIDES * walker.stride_s
-            disturbance = random(SEED, number, 1e-3 * ground_mm, walker.step_m, pushed_within_s)
-            outcomes.append(walker.walk(disturbance, STRIDES))
-        result[f"strides {ground_mm}"] = float(np.mean([o.strides for o in outcomes]))
-        result[f"share {ground_mm}"] = float(np.mean([o.end == "completed" for o in outcomes]))
-    return result
+    path = file.parent / "walks" / f"{file.stem}-{name}-{ground_mm}.json"
+    outcomes = [Outcome(**kept) for kept in json.loads(path.read_text())] if path.exists() else []
+    walker = SimulatedWalker(read_gait(file), contact)
+    pushed_within_s = 0.5 * STRIDES * walker.stride_s
+    for number in range(len(outcomes), walks):
+        disturbance = random(SEED, number, 1e-3 * ground_mm, walker.step_m, pushed_within_s)
+        outcomes.append(walker.walk(disturbance, STRIDES))
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps([vars(outcome) for outcome in outcomes]))
+    done = outcomes[:walks]
+    share = float(np.mean([outcome.end == "completed" for outcome in done]))
+    return OnGround(float(np.mean([outcome.strides for outcome in done])), share)
 
 
-def in_gaitwright(program: str, gait_file: Path, walks: int) -> Result:
+def in_gaitwright(program: str, file: Path, ground_mm: int, walks: int) -> OnGround:
     """Walks of a gait in the plant of Gaitwright."""
-    result: Result = {}
-    for ground_mm in GROUNDS_MM:
-        options = ["--walks", str(walks), "--ground", str(ground_mm), "--seed", str(SEED), "--json"]
-        command = [program, "simulate", str(gait_file), *options]
-        report = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-        [ground] = report["grounds"]
-        result["undisturbed"] = report["undisturbed_strides"]
-        result[f"strides {ground_mm}"] = ground["mean_strides"]
-        result[f"share {ground_mm}"] = ground["completed_share"]
-    return result
+    path = file.parent / "walks" / f"{file.stem}-gaitwright-{ground_mm}-{walks}.json"
+    if path.exists():
+        return OnGround(**json.loads(path.read_text()))
+    options = ["--walks", str(walks), "--ground", str(ground_mm), "--seed", str(SEED), "--json"]
+    result = subprocess.run([program, "simulate", str(file), *options], capture_output=True, text=True, check=True)
+    [ground] = json.loads(result.stdout)["grounds"]
+    found = OnGround(ground["mean_strides"], ground["completed_share"])
+    path.write_text(json.dumps(vars(found)))
+    return found
 
 
-def result_of(plant: str, program: str, gait_file: Path, walks: int) -> Result:
-    """The result in a plant, from the folder of results if it is there."""
-    kept = gait_file.parent / "results" / f"{gait_file.stem}-{plant}-{walks}.json"
-    if kept.exists():
-        return json.loads(kept.read_text())
-    if plant == "gaitwright":
-        result = in_gaitwright(program, gait_file, walks)
-    else:
-        result = in_mujoco(gait_file, {"documented": DOCUMENTED, "default": DEFAULT}[plant], walks)
-    kept.parent.mkdir(exist_ok=True)
-    kept.write_text(json.dumps(result))
-    return result
+def of_all(files: list[Path], what: str, walk: Callable[[Path, int], OnGround]) -> Results:
+    """The results of all gaits on each ground."""
+    results: Results = {}
+    for file in files:
+        results[file.stem] = {ground_mm: walk(file, ground_mm) for ground_mm in GROUNDS_MM}
+        print(what, file.stem, file=sys.stderr, flush=True)
+    return results
 
 
-def print_table(results: dict[str, dict[str, Result]]) -> None:
-    """A row for each gait, three plants in each column."""
-    print("Plants: gaitwright, MuJoCo with the documented contact, MuJoCo with its default contact")
-    columns = ["undisturbed", *(f"{what} {mm}" for mm in GROUNDS_MM for what in ("strides", "share"))]
-    print(f"{'gait':14}" + "".join(f"{column:>24}" for column in columns))
-    for name, plants in results.items():
-        cells = [" ".join(f"{plants[plant][column]:5.2f}" for plant in PLANTS) for column in columns]
-        print(f"{name:14}" + "".join(f"{cell:>24}" for cell in cells))
+def print_table(gaitwright: Results, mujoco: Results) -> None:
+    """A row for each gait: Gaitwright first, MuJoCo second."""
+    print(f"{'':14}" + "".join(f"{f'+-{mm} mm: strides':>20}{'complete':>15}" for mm in GROUNDS_MM))
+    for name, ours in gaitwright.items():
+        cells = [
+            f"{a.strides:13.2f} {b.strides:6.2f}{a.share:9.2f} {b.share:5.2f}"
+            for a, b in ((ours[mm], mujoco[name][mm]) for mm in GROUNDS_MM)
+        ]
+        print(f"{name:14}" + "".join(cells))
 
 
-def print_correlations(results: dict[str, dict[str, Result]]) -> None:
-    """Rank correlations of all gaits, and of those of each subject."""
-
-    def values(names: list[str], plant: str, column: str) -> np.ndarray:
-        return np.array([results[name][plant][column] for name in names])
-
-    groups = {"all": list(results)}
+def print_correlations(gaitwright: Results, mujoco: Results) -> None:
+    """Rank correlations over all gaits, those of each subject, and those that fall early or walk on in Gaitwright."""
+    groups = {"all": list(gaitwright)}
     for subject in ("1", "2"):
-        groups[f"subject {subject}"] = [name for name in results if name.split("-")[1] == subject]
-    for column in [f"{what} {mm}" for mm in GROUNDS_MM for what in ("strides", "share")]:
+        groups[f"subject {subject}"] = [name for name in gaitwright if name.split("-")[1] == subject]
+    level = GROUNDS_MM[0]
+    groups["walk on"] = [name for name, ours in gaitwright.items() if ours[level].strides > EARLY_STRIDES]
+    groups["fall early"] = [name for name in gaitwright if name not in groups["walk on"]]
+    for mm in GROUNDS_MM:
         for group, names in groups.items():
-            for first, second in (("gaitwright", "documented"), ("gaitwright", "default"), ("documented", "default")):
-                text = spearman(values(names, first, column), values(names, second, column))
-                print(f"{column:10} {group:9} ({len(names):2} gaits) {first:10} with {second:10}: {text}")
+            for what in ("strides", "share"):
+                ours = np.array([getattr(gaitwright[name][mm], what) for name in names])
+                theirs = np.array([getattr(mujoco[name][mm], what) for name in names])
+                print(f"+-{mm} mm, {what:7}, {group:10} ({len(names):2} gaits): {spearman(ours, theirs)}")
 
 
 def main() -> None:
-    program, folder = sys.argv[1], Path(sys.argv[2])
-    walks = int(sys.argv[3]) if len(sys.argv) > 3 else 50
-    gait_files = [file for file in sorted(folder.glob("*.json")) if not file.stem.startswith("development")]
-    results: dict[str, dict[str, Result]] = {file.stem: {} for file in gait_files}
-    for plant in PLANTS:
-        for file in gait_files:
-            results[file.stem][plant] = result_of(plant, program, file, walks)
-            print(plant, file.stem, file=sys.stderr, flush=True)
-    print_table(results)
-    print_correlations(results)
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("program")
+    arguments.add_argument("folder", type=Path)
+    arguments.add_argument("--contact", choices=CONTACTS, default="documented")
+    arguments.add_argument("--walks", type=int, default=10)
+    arguments.add_argument("--walks-in-gaitwright", type=int, default=50)
+    given = arguments.parse_args()
+    files = distinct(given.folder)
+    contact = CONTACTS[given.contact]
+    mujoco = of_all(
+        files, "MuJoCo", lambda file, mm: in_mujoco(file, contact, given.contact, mm, given.walks)
+    )
+    gaitwright = of_all(
+        files, "Gaitwright", lambda file, mm: in_gaitwright(given.program, file, mm, given.walks_in_gaitwright)
+    )
+    print(f"{len(files)} gaits; {given.walks_in_gaitwright} walks in Gaitwright, {given.walks} in MuJoCo")
+    print_table(gaitwright, mujoco)
+    print_correlations(gaitwright, mujoco)
 
 
 if __name__ == "__main__":
