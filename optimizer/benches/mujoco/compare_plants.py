@@ -1,6 +1,6 @@
 """Walks with the same gaits in MuJoCo and in `gaitwright simulate`, and how well both agree on the order of the gaits.
 
-    python compare_plants.py PROGRAM FOLDER [--contact documented] [--walks 10] [--walks-in-gaitwright 50]
+    python compare_plants.py PROGRAM FOLDER [--contact documented] [--grounds 0 5] [--walks 10]
 
 Walks are kept in FOLDER/walks: the command continues after a stop, and more walks in MuJoCo extend those that are there.
 """
@@ -23,11 +23,10 @@ from walker_model import DEFAULT, DOCUMENTED, Contact
 
 STRIDES = 20
 SEED = 7
-GROUNDS_MM = (0, 5)
 CONTACTS = {"documented": DOCUMENTED, "default": DEFAULT}
 # Largest difference of a coordinate by which two files have the same gait, m or rad.
 SAME_GAIT = 1e-3
-# Mean strides on level ground in Gaitwright up to which a gait falls early.
+# Mean strides on the first ground in Gaitwright up to which a gait falls early.
 EARLY_STRIDES = 3.0
 
 
@@ -92,35 +91,35 @@ def in_gaitwright(program: str, file: Path, ground_mm: int, walks: int) -> OnGro
     return found
 
 
-def of_all(files: list[Path], what: str, walk: Callable[[Path, int], OnGround]) -> Results:
+def of_all(files: list[Path], grounds_mm: list[int], what: str, walk: Callable[[Path, int], OnGround]) -> Results:
     """The results of all gaits on each ground."""
     results: Results = {}
     for file in files:
-        results[file.stem] = {ground_mm: walk(file, ground_mm) for ground_mm in GROUNDS_MM}
+        results[file.stem] = {ground_mm: walk(file, ground_mm) for ground_mm in grounds_mm}
         print(what, file.stem, file=sys.stderr, flush=True)
     return results
 
 
-def print_table(gaitwright: Results, mujoco: Results) -> None:
+def print_table(grounds_mm: list[int], gaitwright: Results, mujoco: Results) -> None:
     """A row for each gait: Gaitwright first, MuJoCo second."""
-    print(f"{'':14}" + "".join(f"{f'+-{mm} mm: strides':>20}{'complete':>15}" for mm in GROUNDS_MM))
+    print(f"{'':14}" + "".join(f"{f'+-{mm} mm: strides':>20}{'complete':>15}" for mm in grounds_mm))
     for name, ours in gaitwright.items():
         cells = [
             f"{a.strides:13.2f} {b.strides:6.2f}{a.share:9.2f} {b.share:5.2f}"
-            for a, b in ((ours[mm], mujoco[name][mm]) for mm in GROUNDS_MM)
+            for a, b in ((ours[mm], mujoco[name][mm]) for mm in grounds_mm)
         ]
         print(f"{name:14}" + "".join(cells))
 
 
-def print_correlations(gaitwright: Results, mujoco: Results) -> None:
+def print_correlations(grounds_mm: list[int], gaitwright: Results, mujoco: Results) -> None:
     """Rank correlations over all gaits, those of each subject, and those that fall early or walk on in Gaitwright."""
     groups = {"all": list(gaitwright)}
     for subject in ("1", "2"):
         groups[f"subject {subject}"] = [name for name in gaitwright if name.split("-")[1] == subject]
-    level = GROUNDS_MM[0]
-    groups["walk on"] = [name for name, ours in gaitwright.items() if ours[level].strides > EARLY_STRIDES]
+    first = grounds_mm[0]
+    groups["walk on"] = [name for name, ours in gaitwright.items() if ours[first].strides > EARLY_STRIDES]
     groups["fall early"] = [name for name in gaitwright if name not in groups["walk on"]]
-    for mm in GROUNDS_MM:
+    for mm in grounds_mm:
         for group, names in groups.items():
             for what in ("strides", "share"):
                 ours = np.array([getattr(gaitwright[name][mm], what) for name in names])
@@ -135,18 +134,21 @@ def main() -> None:
     arguments.add_argument("--contact", choices=CONTACTS, default="documented")
     arguments.add_argument("--walks", type=int, default=10)
     arguments.add_argument("--walks-in-gaitwright", type=int, default=50)
+    arguments.add_argument("--grounds", type=int, nargs="+", default=[0, 5])
     given = arguments.parse_args()
-    files = distinct(given.folder)
-    contact = CONTACTS[given.contact]
-    mujoco = of_all(
-        files, "MuJoCo", lambda file, mm: in_mujoco(file, contact, given.contact, mm, given.walks)
-    )
-    gaitwright = of_all(
-        files, "Gaitwright", lambda file, mm: in_gaitwright(given.program, file, mm, given.walks_in_gaitwright)
-    )
+    files, contact, grounds_mm = distinct(given.folder), CONTACTS[given.contact], given.grounds
+
+    def mujoco_walks(file: Path, mm: int) -> OnGround:
+        return in_mujoco(file, contact, given.contact, mm, given.walks)
+
+    def gaitwright_walks(file: Path, mm: int) -> OnGround:
+        return in_gaitwright(given.program, file, mm, given.walks_in_gaitwright)
+
+    mujoco = of_all(files, grounds_mm, "MuJoCo", mujoco_walks)
+    gaitwright = of_all(files, grounds_mm, "Gaitwright", gaitwright_walks)
     print(f"{len(files)} gaits; {given.walks_in_gaitwright} walks in Gaitwright, {given.walks} in MuJoCo")
-    print_table(gaitwright, mujoco)
-    print_correlations(gaitwright, mujoco)
+    print_table(grounds_mm, gaitwright, mujoco)
+    print_correlations(grounds_mm, gaitwright, mujoco)
 
 
 if __name__ == "__main__":
