@@ -36,6 +36,7 @@ fn documents() -> BTreeMap<PathBuf, String> {
         "optimizer",
         "optimizer/data",
         "optimizer/benches/casadi",
+        "optimizer/benches/mujoco",
         "learner",
         "server/clients/python",
     ];
