@@ -67,8 +67,12 @@ async fn browser_leads_from_an_empty_folder_to_a_recommended_gait_with_the_progr
     let phase = "document.querySelector('.outcome [data-phase]').textContent";
     let before = page.value(phase).await;
     page.wait_until(&format!("{phase} !== {before:?}")).await;
-    page.wait_for("[data-part=best] a[download][href*=controller]").await;
-    page.click("[data-part=best] a.button").await;
+    let controller_file = "[data-part=best] a[download][href*=controller]";
+    while page.count(controller_file).await == 0 {
+        assert!(begun.elapsed() < PATIENCE, "{}", page.text("main").await);
+        tokio::time::sleep(Duration::from_millis(200)).await;
+    }
+    page.click("[data-part=best] a.button[href^='/trials/']").await;
     page.wait_until("location.pathname.startsWith('/trials/')").await;
     page.wait_until("document.querySelectorAll('svg.chart').length >= 12").await;
     page.wait_for(".walker svg.gait-walker").await;
