@@ -492,7 +492,7 @@ fn unusual_mean_strides_get_a_warning() {
         [torso - twice, hip_l - twice, knee_l, ankle_l, hip_r - twice, knee_r, ankle_r]
     };
     let cases = [
-        ("ankle sign", said_of(&walk(0.0, |a| with_ankle(a, -a[3]))), "left ankle (correlation -1.00)"),
+        ("ankle sign", said_of(&walk(0.0, |a| with_ankle(a, -a[3]))), "left ankle (correlation −1.00)"),
         (
             "knees swapped",
             said_of(&walk(0.0, swapped(&[(2, 5)]))),
