@@ -24,3 +24,8 @@ export function showLocalTimes(part) {
 }
 
 showLocalTimes(document);
+
+// A page on paper says when it was printed.
+addEventListener("beforeprint", () => {
+  for (const part of document.querySelectorAll("[data-printed]")) part.textContent = ` · printed ${minute(new Date())}`;
+});

@@ -30,15 +30,13 @@ use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Instant, TrialId, certificates, events, gaits, now, reference_gaits, studies, trials};
+use gaitwright_store::{TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 use serde::Deserialize;
 
 #[derive(Template)]
 #[template(path = "gait.html")]
 struct GaitPage {
     study: Study,
-    /// The time of this page, for a print.
-    as_of: Instant,
     state: String,
     rmse: String,
     cost: String,
@@ -169,7 +167,6 @@ pub(super) async fn get(
     };
     let (drawn, summary, sensitivities) = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
-        as_of: now(),
         state: words(trial.state.as_str()),
         rmse: format::decimal(trial.gait_rmse_rad),
         cost: format::decimal(trial.cost_of_transport),

@@ -127,6 +127,9 @@ mod tests {
         let half = Flags { tls_key: Some("k.pem".to_owned()), ..Flags::default() };
         assert!(settings(&half, &[]).unwrap().tls().is_err());
         assert!(parse(Path::new("x.toml"), "colour = 1").unwrap_err().to_string().contains("colour is not a setting"));
+        let secret = "workers = 2\nnats = \"nats://u:SECRET@x\n";
+        let broken = parse(Path::new("x.toml"), secret).unwrap_err().to_string();
+        assert!(broken.contains("line 2, column ") && !broken.contains("SECRET"), "{broken}");
         assert!(parse(Path::new("x.toml"), "workers = [1]").is_err());
         assert!(parse(Path::new("x.toml"), "workers = ").is_err());
         let dotted = Flags { nats_queue: Some("a.b".to_owned()), ..Flags::default() };

@@ -11,7 +11,7 @@ pub(super) fn read(path: &Path) -> Result<String, Error> {
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>, Error> {
     let malformed = |reason: String| Error::Malformed(format!("{}: {reason}", path.display()));
-    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| malformed(e.to_string()))?;
+    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| malformed(fault(text, &e)))?;
     let mut values = BTreeMap::new();
     for (name, value) in table {
         if !KNOWN.iter().any(|(known, ..)| *known == name) {
@@ -28,4 +28,12 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>,
         values.insert(name, value);
     }
     Ok(values)
+}
+
+/// Where a file is not TOML, and why. The line itself may hold a secret, so it is not repeated.
+fn fault(text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+    format!("line {line}, column {column}: {}.", error.message())
 }

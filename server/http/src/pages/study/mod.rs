@@ -34,7 +34,7 @@ use gaitwright_store::studies::Study;
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{
-    Instant, LabSessionId, StudyId, TrialId, consents, events, lab_sessions, now, reference_gaits, studies, trials,
+    LabSessionId, StudyId, TrialId, consents, events, lab_sessions, reference_gaits, studies, trials,
 };
 
 #[derive(Template)]
@@ -56,8 +56,6 @@ struct StudyPage {
     variant: &'static str,
     answer_source: &'static str,
     may_administer: bool,
-    /// The time of this page, for a print.
-    as_of: Instant,
     /// Imports; empty if the study was created here.
     imports: Vec<Import>,
 }
@@ -120,7 +118,6 @@ pub(super) async fn get(
         variant,
         answer_source,
         may_administer,
-        as_of: now(),
         imports,
     })
 }
