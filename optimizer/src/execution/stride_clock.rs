@@ -2,8 +2,7 @@
 //!
 //! The clock advances with time. Where a measured phase variable moves with the planned one, the clock is corrected until
 //! they agree; where the phase variable stands still or turns round, time alone advances the clock. It never runs
-//! backwards, and it waits at the end of a section for the event that starts the next one. A heel strike
-//! restarts it.
+//! backwards, and it waits at the end of a section for the event that starts the next one. A heel strike restarts it.
 
 use super::foot_contact::FootContact;
 use crate::body::LegGeometry;

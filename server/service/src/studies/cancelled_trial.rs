@@ -7,7 +7,7 @@ use gaitwright_store::trials::{Trial, TrialEnd};
 use gaitwright_store::{TrialId, Writer, events, solve_jobs, trials};
 use serde_json::json;
 
-/// Cancels an open trial.
+/// Cancels an open trial at a person's request.
 ///
 /// # Errors
 /// [`Error::NotFound`], or [`Error::Conflict`] if the trial has ended.
@@ -17,7 +17,7 @@ pub async fn cancel(writer: &mut Writer, actor: &Actor, id: TrialId, reason: &st
     Ok(trials::get(writer, id).await?)
 }
 
-/// Cancels an open trial at a person's request.
+/// Ends an open trial as cancelled. The caller writes the audit trail.
 ///
 /// # Errors
 /// [`Error::Conflict`] if the trial has ended; errors of the database.
