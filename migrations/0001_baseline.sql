@@ -147,7 +147,7 @@ create table studies (
     state_reason         text not null default '',
     cloned_from          text references studies (id),
     -- Tags, notes and the time of archiving help people to find a study. They do not affect its trials.
-    tags                 text constraint studies_tags check (json_valid(tags) and length(tags) <= 1000),
+    tags                 text constraint studies_tags check (tags is null or json_valid(tags) and length(tags) <= 1000),
     notes                text constraint studies_notes_length check (length(notes) between 1 and 4000),
     archived_at          text,
     -- Increases with each change. It is the entity tag of the study.

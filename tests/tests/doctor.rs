@@ -10,9 +10,10 @@ use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection};
 use std::path::Path;
 
-/// Its exit code, and its lines.
+/// Its exit code, and its lines. It checks any free port, unless the arguments name an address.
 fn doctor(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
-    let arguments: Vec<&str> = ["doctor"].iter().chain(arguments).copied().collect();
+    let address: &[&str] = if arguments.contains(&"--listen") { &[] } else { &["--listen", "127.0.0.1:0"] };
+    let arguments: Vec<&str> = ["doctor"].iter().chain(address).chain(arguments).copied().collect();
     let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder, &arguments);
     let text = String::from_utf8(output.stdout).unwrap();
     (output.status.code(), text.lines().map(str::to_owned).collect())
@@ -28,6 +29,12 @@ fn only_error((code, lines): (Option<i32>, Vec<String>)) -> String {
     found
 }
 
+/// The line of a check.
+#[track_caller]
+fn line<'a>(lines: &'a [String], check: &str) -> &'a str {
+    lines.iter().find(|line| line.split_whitespace().nth(1) == Some(check)).expect("the check")
+}
+
 async fn change(database: &Path, sql: &str) {
     let mut connection = SqliteConnection::connect(database.to_str().unwrap()).await.unwrap();
     sqlx::query(AssertSqlSafe(sql.to_owned())).execute(&mut connection).await.unwrap();
@@ -40,9 +47,12 @@ fn doctor_describes_a_machine_without_a_record_and_creates_nothing() {
     let (code, lines) = doctor(folder.path(), &[]);
     assert_eq!(code, Some(0), "{lines:?}");
     let said: Vec<&str> = lines.iter().map(|line| line.split_whitespace().nth(1).unwrap()).collect();
-    assert_eq!(said, ["program", "kernels", "settings", "disk", "record", "clock", "broker"]);
+    assert_eq!(
+        said,
+        ["program", "kernels", "settings", "tls", "address", "folders", "disk", "record", "clock", "broker"]
+    );
     assert!(lines.iter().all(|line| line.starts_with("ok ")), "{lines:?}");
-    assert!(lines[4].contains("no record yet at"), "{lines:?}");
+    assert!(line(&lines, "record").contains("no record yet at"), "{lines:?}");
     assert!(cli::files(folder.path()).is_empty());
 }
 
@@ -51,7 +61,7 @@ async fn doctor_reports_a_clock_that_was_set_back() {
     let (folder, database) = filled().await;
     let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
     assert_eq!(code, Some(0), "{lines:?}");
-    assert!(lines[4].contains("a.db is intact"), "{lines:?}");
+    assert!(line(&lines, "record").contains("a.db is intact"), "{lines:?}");
     let store = Store::open(&database).await.unwrap();
     let mut writer = store.write().await.unwrap();
     access_clock::reach(&mut writer, "2099-01-01T00:00:00.000Z".parse().unwrap()).await.unwrap();
@@ -74,8 +84,8 @@ fn doctor_reports_an_unreachable_broker_and_a_missing_folder() {
     let folder = tempfile::tempdir().unwrap();
     let broker = only_error(doctor(folder.path(), &["--nats", "nats://127.0.0.1:1"]));
     assert!(broker.contains("The NATS broker failed"), "{broker}");
-    let disk = only_error(doctor(folder.path(), &["--database", "no/such/a.db"]));
-    assert!(disk.contains("does not exist"), "{disk}");
+    let folders = only_error(doctor(folder.path(), &["--database", "no/such/a.db"]));
+    assert!(folders.contains("cannot write to the folder no/such"), "{folders}");
 }
 
 #[test]
@@ -84,7 +94,7 @@ fn doctor_reports_the_version_of_a_reachable_broker() {
     let folder = tempfile::tempdir().unwrap();
     // The process may not listen yet.
     let found = (0..100).map(|_| doctor(folder.path(), &["--nats", &broker.url()])).find(|(code, _)| *code == Some(0));
-    assert!(found.unwrap().1[6].contains("with JetStream"));
+    assert!(line(&found.unwrap().1, "broker").contains("with JetStream"));
 }
 
 #[test]
@@ -93,8 +103,9 @@ fn doctor_names_settings_with_which_the_service_does_not_start() {
     for (flags, named) in [
         (&["--listen", "nonsense"][..], "listen"),
         (&["--backup-folder", "missing"], "backup_folder"),
-        (&["--anchor", "missing/anchor"], "anchor"),
-        (&["--tls-certificate", "missing", "--tls-key", "missing"], "tls_certificate"),
+        (&["--anchor", "missing/anchor"], "the folder missing"),
+        (&["--tls-certificate", "missing", "--tls-key", "missing"], "the certificate missing"),
+        (&["--listen", "0.0.0.0:0", "--no-sign-in"], "without sign-in"),
     ] {
         let found = only_error(doctor(folder.path(), flags));
         assert!(found.starts_with("error") && found.contains(named), "{found}");
@@ -107,4 +118,61 @@ fn doctor_prints_no_password_of_a_refused_setting() {
     let (code, lines) = doctor(folder.path(), &["--nats", "http://lab:s3cret@broker:4222"]);
     assert_eq!(code, Some(1), "{lines:?}");
     assert!(!lines.join("\n").contains("s3cret"), "{lines:?}");
+}
+
+#[test]
+fn doctor_refuses_a_certificate_that_the_service_refuses() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("c.pem"), "not a certificate").unwrap();
+    std::fs::write(folder.path().join("k.pem"), "not a key").unwrap();
+    let flags = ["--tls-certificate", "c.pem", "--tls-key", "k.pem", "--listen", "127.0.0.1:0"];
+    let found = only_error(doctor(folder.path(), &flags));
+    let arguments: Vec<&str> = ["serve"].into_iter().chain(flags).collect();
+    let serve = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &arguments);
+    assert!(!serve.status.success());
+    let refused = String::from_utf8(serve.stderr).unwrap();
+    let (_, reason) = found.split_once("tls").expect("the check of the certificate");
+    assert!(refused.contains(reason.trim()), "{found}\n{refused}");
+}
+
+#[test]
+fn doctor_reports_a_port_in_use() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = other.local_addr().unwrap().to_string();
+    let found = only_error(doctor(folder.path(), &["--listen", &address]));
+    assert!(found.contains(&format!("Cannot listen on {address}")), "{found}");
+}
+
+#[tokio::test]
+async fn doctor_accepts_the_address_of_a_service_that_has_the_record_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(&folder.path().join("a.db")).await.unwrap();
+    let service = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let flags = ["--database", "a.db", "--listen", &service.local_addr().unwrap().to_string()];
+    let (code, lines) = doctor(folder.path(), &flags);
+    assert_eq!(code, Some(0), "{lines:?}");
+    assert!(line(&lines, "address").contains("the service seems to be running"), "{lines:?}");
+    store.close().await;
+}
+
+#[test]
+fn doctor_checks_everything_else_if_the_settings_file_is_broken_or_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "nats = \"nats://lab:s3cret@broker:4222\n").unwrap();
+    for (flags, named) in [(&[][..], "line 1, column "), (&["--config", "none.toml"], "Cannot read none.toml")] {
+        let (code, lines) = doctor(folder.path(), flags);
+        assert_eq!((code, lines.len()), (Some(1), 10), "{lines:?}");
+        let found = only_error((code, lines.clone()));
+        assert!(found.contains("settings") && found.contains(named), "{found}");
+        assert!(!lines.join("\n").contains("s3cret"), "{lines:?}");
+    }
+}
+
+#[test]
+fn doctor_reports_an_invalid_log_filter() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "log_format = \"xml\"\n").unwrap();
+    let found = only_error(doctor(folder.path(), &[]));
+    assert!(found.contains("log_format"), "{found}");
 }

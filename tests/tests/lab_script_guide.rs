@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 
 const GUIDE: &str = include_str!("../../docs/lab-script.md");
 
-/// Addresses that are neither operations nor pages.
-const OTHER: [&str; 2] = ["/health", "/api/openapi.json"];
+/// Addresses that are neither operations nor pages, and a folder.
+const OTHER: [&str; 3] = ["/health", "/api/openapi.json", "/usr/share/doc/gaitwright/examples"];
 
 /// An address in the guide.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,6 +11,24 @@ use std::process::{Command, Output};
 /// A program of this machine that exits with 0, whatever its arguments.
 const PROGRAM: &str = "/bin/true";
 
+const LICENCES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
+
+const EXAMPLES: [(&str, &str); 3] = [
+    ("ask_tell.m", "server/clients/matlab/ask_tell.m"),
+    ("example.py", "server/clients/python/example.py"),
+    ("gait.ipynb", "server/clients/python/gait.ipynb"),
+];
+
+fn of_repository(path: &str) -> Vec<u8> {
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)).unwrap()
+}
+
+fn assert_examples(folder: &Path) {
+    for (name, source) in EXAMPLES {
+        assert_eq!(std::fs::read(folder.join(name)).unwrap(), of_repository(source), "{name}");
+    }
+}
+
 fn run(command: &mut Command) -> Output {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -60,6 +78,31 @@ fn wheel_installs_the_program_and_the_client_without_a_network() {
     let import = "import gaitwright_client; print(gaitwright_client.__file__)";
     let output = run(Command::new(environment.join("bin/python")).args(["-c", import]));
     assert!(String::from_utf8_lossy(&output.stdout).starts_with(&*environment.to_string_lossy()), "{output:?}");
+    assert_examples(&environment.join("share/gaitwright/examples"));
+    let licences = "from importlib.metadata import files; print(*[f.locate() for f in files('gaitwright')], sep='\\n')";
+    let output = run(Command::new(environment.join("bin/python")).args(["-c", licences]));
+    let installed = String::from_utf8(output.stdout).unwrap();
+    for licence in LICENCES {
+        let file = installed.lines().find(|file| file.ends_with(licence)).expect("the text of the licence");
+        assert_eq!(std::fs::read(file).unwrap(), of_repository(licence));
+    }
+}
+
+#[test]
+fn tarball_has_the_program_its_own_readme_the_licences_and_the_examples() {
+    let folder = tempfile::tempdir().unwrap();
+    if packages(folder.path()).is_none() {
+        return;
+    }
+    run(Command::new("tar").arg("xzf").arg(with_ending(folder.path(), ".tar.gz")).arg("-C").arg(folder.path()));
+    let content = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    let unpacked = content.into_iter().find(|path| path.is_dir()).unwrap();
+    run(&mut Command::new(unpacked.join("gaitwright")));
+    assert_eq!(std::fs::read(unpacked.join("README.md")).unwrap(), of_repository("server/deploy/packages/README.md"));
+    for licence in LICENCES {
+        assert_eq!(std::fs::read(unpacked.join(licence)).unwrap(), of_repository(licence));
+    }
+    assert_examples(&unpacked.join("examples"));
 }
 
 #[test]
@@ -78,4 +121,10 @@ fn debian_package_has_the_program_where_its_unit_starts_it() {
     let unit = std::fs::read_to_string(root.join("usr/lib/systemd/system/gaitwright.service")).unwrap();
     assert!(unit.contains("\nExecStart=/usr/bin/gaitwright serve --config /etc/gaitwright.toml\n"), "{unit}");
     assert!(root.join("etc/gaitwright.toml").is_file());
+    let documents = root.join("usr/share/doc/gaitwright");
+    let copyright = std::fs::read_to_string(documents.join("copyright")).unwrap();
+    for licence in LICENCES {
+        assert!(copyright.contains(&*String::from_utf8(of_repository(licence)).unwrap()));
+    }
+    assert_examples(&documents.join("examples"));
 }

@@ -1,6 +1,6 @@
 """A lab that evaluates trials itself: ask, measure, tell, until the study is finished.
 
-    python3 server/clients/python/example.py http://127.0.0.1:8080 [TOKEN]
+    python3 example.py http://127.0.0.1:8080 [TOKEN]
 
 `measure` stands in for the treadmill. Its Gait RMSE is lowest at a foot clearance of 0.026 m and a torso lean of 0.3 rad.
 """

@@ -66,6 +66,13 @@ def job(state: str) -> Job:
 
 
 class Requests(unittest.TestCase):
+    def test_an_address_without_a_scheme_is_refused_at_once(self) -> None:
+        for address in ("127.0.0.1:8080", "localhost:8080", "ftp://127.0.0.1", "http://", ""):
+            with self.assertRaisesRegex(ValueError, "must begin with http:// or https://"):
+                Client(address)
+        for address in ("http://[::1]:8080/", "https://gait.lab/tuning"):
+            Client(address)
+
     def test_change_is_repeated_with_the_same_key(self) -> None:
         refused: Answer = (409, {"detail": "Both requests ran at the same time."}, {})
         with Service(None, refused, (503, {"detail": "not ready"}, {}), (200, {"id": "t"}, {})) as service:

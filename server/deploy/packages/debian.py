@@ -1,13 +1,11 @@
 """The Debian package: the program, its systemd unit and an empty file of settings."""
 
 import hashlib
-import pathlib
 from typing import Tuple
 
 from archives import File, ar, tar_gz
+from contents import LICENCES, examples, readme, unit
 
-DEPLOY = pathlib.Path(__file__).resolve().parents[1]
-ROOT = DEPLOY.parents[1]
 DEBIAN_NAME = "gaitwright_{version}_{architecture}.deb"
 CONTROL = """Package: gaitwright
 Version: {version}
@@ -35,13 +33,19 @@ SETTINGS = "# Settings of `gaitwright serve`; `gaitwright config show` lists the
 
 def deb(program: bytes, version: str, architecture: str, glibc: Tuple[int, int]) -> bytes:
     """The package of a program that needs this version of glibc."""
-    unit = (DEPLOY / "gaitwright.service").read_text().replace("/usr/local/bin/", "/usr/bin/")
-    licences = "".join((ROOT / name).read_text() + "\n" for name in ("LICENSE-MIT", "LICENSE-APACHE"))
+    documents = {
+        "copyright": b"\n".join(LICENCES.values()),
+        **readme(),
+        **{f"examples/{example}": content for example, content in examples().items()},
+    }
     files = [
         File("./etc/gaitwright.toml", SETTINGS.encode()),
         File("./usr/bin/gaitwright", program, 0o755),
-        File("./usr/lib/systemd/system/gaitwright.service", unit.encode()),
-        File("./usr/share/doc/gaitwright/copyright", licences.encode()),
+        *(
+            File(f"./usr/lib/systemd/system/{name}", content.replace(b"/usr/local/bin/", b"/usr/bin/"))
+            for name, content in unit().items()
+        ),
+        *(File(f"./usr/share/doc/gaitwright/{name}", content) for name, content in documents.items()),
     ]
     sums = "".join(f"{hashlib.md5(file.content).hexdigest()}  {file.path[2:]}\n" for file in files)
     control = CONTROL.format(

@@ -1,12 +1,13 @@
 //! `gaitwright doctor`: checks the machine, the settings and the record, for bug reports.
 
 use super::output::data;
+use super::service_plan::ServicePlan;
 use super::settings::{Flags, Settings};
 use clap::Args;
 use gaitwright_service::error::Error;
 #[cfg(feature = "nats")]
 use gaitwright_service::workers::nats;
-use gaitwright_store::{SCHEMA_VERSION, access_clock, free_bytes, now, verify};
+use gaitwright_store::{SCHEMA_VERSION, access_clock, free_bytes, is_open_elsewhere, now, verify};
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 
@@ -23,21 +24,28 @@ pub(super) struct DoctorCommand {
 enum CheckOutcome {
     Good(String),
     Trouble(String),
+    /// The error of another check prevents this one.
+    Skipped,
 }
-use CheckOutcome::{Good, Trouble};
+use CheckOutcome::{Good, Skipped, Trouble};
 
 impl DoctorCommand {
     pub(super) fn flags(&self) -> Flags {
         (*self.flags).clone()
     }
 
-    /// Prints a line for each check. Returns whether all is well.
-    pub(super) async fn run(self, settings: &Settings) -> Result<bool, Error> {
+    /// Prints a line for each check. Returns whether all is well. If the settings file could not be read, the report has
+    /// its error.
+    pub(super) async fn run(self, settings: &Settings, unread_file: Option<Error>) -> Result<bool, Error> {
         let database = settings.database();
+        let plan = ServicePlan::of(settings).and_then(|plan| settings.log().map(|_| plan));
         let mut checks = vec![
             ("program", program()),
             ("kernels", Good(format!("vector instructions: {}", interior_point::vector_instructions()))),
-            ("settings", of_service(settings)),
+            ("settings", of_settings(unread_file.as_ref(), &plan)),
+            ("tls", tls(&plan).await),
+            ("address", address(&plan, &database)),
+            ("folders", folders(settings, &plan)),
             (
                 "disk",
                 settings.reserve_bytes().map_or_else(|e| Trouble(e.to_string()), |reserve| disk(&database, reserve)),
@@ -53,8 +61,9 @@ impl DoctorCommand {
         checks.push(("broker", broker(settings).await));
         for (what, found) in &checks {
             let (state, text) = match found {
-                Good(text) => ("ok", text),
-                Trouble(text) => ("error", text),
+                Good(text) => ("ok", text.as_str()),
+                Trouble(text) => ("error", text.as_str()),
+                Skipped => ("skipped", "needs valid settings"),
             };
             data(&format!("{state:<8}{what:<9}{text}"))?;
         }
@@ -70,9 +79,8 @@ fn program() -> CheckOutcome {
 
 fn disk(database: &Path, reserve: u64) -> CheckOutcome {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
-    let folder = database.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-    match free_bytes(folder) {
-        _ if !folder.is_dir() => Trouble(format!("the folder {} does not exist", folder.display())),
+    match free_bytes(folder_of(database)) {
+        _ if !folder_of(database).is_dir() => Skipped,
         Some(free) if free < reserve => {
             Trouble(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
         }
@@ -107,40 +115,55 @@ async fn clock_after(database: &Path) -> CheckOutcome {
     }
 }
 
-/// Whether `gaitwright serve` would start with the settings.
-fn of_service(settings: &Settings) -> CheckOutcome {
-    let read = || -> Result<(), Error> {
-        settings.listen()?;
-        settings.sign_in()?;
-        settings.proxies()?;
-        settings.workers()?;
-        settings.session_limits()?;
-        settings.connections()?;
-        settings.access_log_days()?;
-        settings.log()?;
-        Ok(())
-    };
-    let files = || -> Result<(), Error> {
-        if let Some((certificate, key)) = settings.tls()? {
-            for (name, file) in [("tls_certificate", certificate), ("tls_key", key)] {
-                if !file.is_file() {
-                    return Err(settings.refused(name, "an existing file"));
-                }
-            }
-        }
-        if settings.backups()?.is_some_and(|plan| !plan.folder.is_dir()) {
-            return Err(settings.refused("backup_folder", "an existing folder"));
-        }
-        let folder = settings.anchor().and_then(|anchor| anchor.parent().map(Path::to_owned));
-        if folder.is_some_and(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
-            return Err(settings.refused("anchor", "a file in an existing folder"));
-        }
-        Ok(())
-    };
-    match read().and_then(|()| files()) {
-        Ok(()) => Good("the service can start with them".to_owned()),
-        Err(error) => Trouble(error.to_string()),
+/// Whether the settings are readable, within their ranges and consistent.
+fn of_settings(unread_file: Option<&Error>, plan: &Result<ServicePlan, Error>) -> CheckOutcome {
+    match (unread_file, plan) {
+        (Some(error), _) => Trouble(format!("{error} The other checks ignore this file.")),
+        (None, Err(error)) => Trouble(error.to_string()),
+        (None, Ok(_)) => Good("valid".to_owned()),
     }
+}
+
+#[cfg_attr(not(feature = "tls"), allow(clippy::unused_async, reason = "only reading the files waits"))]
+async fn tls(plan: &Result<ServicePlan, Error>) -> CheckOutcome {
+    match plan {
+        Err(_) => Skipped,
+        #[cfg(feature = "tls")]
+        Ok(plan) if plan.tls.is_some() => match plan.acceptor().await {
+            Ok(_) => Good("the certificate and its key can be used".to_owned()),
+            Err(error) => Trouble(error.to_string()),
+        },
+        Ok(_) => Good("no certificate is set, so the service speaks HTTP".to_owned()),
+    }
+}
+
+/// Whether the service can listen on its address, or the running service does.
+fn address(plan: &Result<ServicePlan, Error>, database: &Path) -> CheckOutcome {
+    match plan.as_ref().map(|plan| (plan.listen, plan.listener())) {
+        Err(_) => Skipped,
+        Ok((listen, Ok(_))) => Good(format!("{listen} is free")),
+        Ok((listen, Err(_))) if is_open_elsewhere(database) => {
+            Good(format!("{listen} is in use, and so is the record: the service seems to be running"))
+        }
+        Ok((_, Err(error))) => Trouble(error.to_string()),
+    }
+}
+
+/// Whether the service can write to the folders of the record, the second anchor and the backups.
+fn folders(settings: &Settings, plan: &Result<ServicePlan, Error>) -> CheckOutcome {
+    let Ok(plan) = plan else { return Skipped };
+    let files = [Some(settings.database()), settings.anchor()].into_iter().flatten();
+    let mut wanted: Vec<PathBuf> = files.map(|file| folder_of(&file).to_owned()).collect();
+    wanted.extend(plan.backups.as_ref().map(|backups| backups.folder.clone()));
+    let refused = wanted.iter().find_map(|folder| Some((folder, tempfile::tempfile_in(folder).err()?)));
+    match refused {
+        Some((folder, error)) => Trouble(format!("cannot write to the folder {}: {}", folder.display(), error.kind())),
+        None => Good("writable".to_owned()),
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
 #[cfg_attr(not(feature = "nats"), allow(clippy::unused_async, reason = "only the check of a broker waits"))]

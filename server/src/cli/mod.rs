@@ -33,6 +33,7 @@ mod reference_comparison;
 mod reproduce;
 mod resumed_study;
 mod serve;
+mod service_plan;
 mod settings;
 mod simulate;
 mod solve;
@@ -152,12 +153,17 @@ impl Command {
 /// Runs the program.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
-    let settings = match Settings::read(&cli.command.flags()) {
-        Ok(settings) => settings,
+    let flags = cli.command.flags();
+    let is_doctor = matches!(cli.command, Command::Doctor(_));
+    let (settings, unread_file) = match Settings::read(&flags) {
+        Ok(settings) => (settings, None),
+        // The report says that the file cannot be read, and checks everything else.
+        Err(error) if is_doctor => (Settings::without_file(&flags), Some(error)),
         Err(error) => return report(&error),
     };
-    if let Err(error) = settings.log().and_then(|(filter, json)| logging::start(filter, json)) {
-        return report(&error);
+    match settings.log().and_then(|(filter, json)| logging::start(filter, json)) {
+        Err(error) if !is_doctor => return report(&error),
+        _ => {}
     }
     for name in unknown_variables(std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())) {
         tell(&format!(
@@ -184,7 +190,7 @@ pub fn run() -> ExitCode {
         Command::Audit(audit) => runtime.block_on(audit.run(&settings)).map(|()| CommandEnd::Done),
         Command::Config(_) => config::ConfigCommand::run(&settings).map(|()| CommandEnd::Done),
         Command::Doctor(doctor) => {
-            let healthy = runtime.block_on(doctor.run(&settings));
+            let healthy = runtime.block_on(doctor.run(&settings, unread_file));
             healthy.map(|healthy| if healthy { CommandEnd::Done } else { CommandEnd::Failed })
         }
         Command::Openapi => {

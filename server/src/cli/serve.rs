@@ -3,14 +3,13 @@
 use super::cores::cores_or;
 use super::interruption::interrupted;
 use super::output::tell;
+use super::service_plan::ServicePlan;
 use super::settings::{Flags, Settings};
-#[cfg(feature = "tls")]
-use super::tls;
 use axum_server::{Handle, Server};
 use clap::Args;
 use gaitwright_http::access_log_layer::keep_pruning;
 use gaitwright_http::connections::{LimitedListener, Peer};
-use gaitwright_http::{AccessState, AppState, Hosts, is_loopback_name, router};
+use gaitwright_http::{AccessState, AppState, Hosts, router};
 use gaitwright_service::access::user_administration;
 use gaitwright_service::backups::Backups;
 use gaitwright_service::error::Error;
@@ -25,7 +24,7 @@ use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use hyper_util::rt::{TokioExecutor, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -46,57 +45,33 @@ pub(super) struct ServeCommand {
 
 impl ServeCommand {
     pub(super) async fn run(self, settings: &Settings) -> Result<(), Error> {
-        let (listen, sign_in, tls) = (settings.listen()?, settings.sign_in()?, settings.tls()?);
-        let proxies = settings.proxies()?;
-        if !sign_in {
-            // Whoever reaches the service may change everything.
-            if !listen.ip().is_loopback() {
-                let allowed = "a loopback address such as 127.0.0.1:8080, because the service runs without sign-in";
-                return Err(settings.refused("listen", allowed));
-            }
-            if proxies.are_any() {
-                let allowed = "empty, because the service runs without sign-in and a proxy would let other machines change everything";
-                return Err(settings.refused("trusted_proxies", allowed));
-            }
-            if !settings.host_names().iter().all(|name| is_loopback_name(name)) {
-                let allowed = "localhost, because the service runs without sign-in and other names let other machines change everything";
-                return Err(settings.refused("host_names", allowed));
-            }
-        }
-        let local = listen.ip().is_loopback();
-        let (workers, sessions, database) = (settings.workers()?, settings.session_limits()?, settings.database());
-        let limits = settings.connections()?.within_descriptors();
-        let access_log_days = settings.access_log_days()?;
-        let backups = settings.backups()?;
-        // Check all settings before any file is created.
-        let reserve = settings.reserve_bytes()?;
-        let secure = tls.is_some();
+        // Check everything before any file is created.
+        let plan = ServicePlan::of(settings)?;
         #[cfg(feature = "tls")]
-        let tls = match tls {
-            Some((certificate, key)) => Some(tls::acceptor(certificate, key).await?),
-            None => None,
-        };
-        let cannot_listen = |e: std::io::Error| Error::Malformed(format!("Cannot listen on {listen}: {e}."));
-        let listener = TcpListener::bind(listen).map_err(cannot_listen)?;
-        listener.set_nonblocking(true).map_err(cannot_listen)?;
-        let address = listener.local_addr().map_err(cannot_listen)?;
+        let acceptor = plan.acceptor().await?;
+        let listener = plan.listener()?;
+        let address = listener.local_addr().map_err(|e| plan.cannot_listen(&e))?;
+        let (database, proxies) = (settings.database(), plan.proxies.clone());
         let store = settings.open_record().await?;
-        let backups = backups.map(|plan| plan.claim(&store)).transpose()?;
-        store.set_reserve(reserve);
+        let backups = plan.backups.clone().map(|backups| backups.claim(&store)).transpose()?;
+        store.set_reserve(plan.reserve_bytes);
         let mut writer = store.write().await?;
         built_in_entries::ensure(&mut writer).await?;
         commit(writer).await?;
-        let mut access =
-            if sign_in { AccessState::by_sign_in(sessions.idle_seconds) } else { AccessState::without_sign_in() };
-        access.limits = sessions;
-        access.secure = secure;
+        let mut access = if plan.sign_in {
+            AccessState::by_sign_in(plan.sessions.idle_seconds)
+        } else {
+            AccessState::without_sign_in()
+        };
+        access.limits = plan.sessions;
+        access.secure = plan.tls.is_some();
 
         let scheme = if access.secure { "https" } else { "http" };
         let origin = format!("{scheme}://{address}");
-        let link = if sign_in { self.link(&store).await? } else { None };
+        let link = if plan.sign_in { self.link(&store).await? } else { None };
 
-        let size = cores_or(workers);
-        let engine: Arc<dyn Dispatch> = match settings.nats()? {
+        let size = cores_or(plan.workers);
+        let engine: Arc<dyn Dispatch> = match &plan.nats {
             #[cfg(feature = "nats")]
             Some((url, queue)) => Arc::new(JetStream::connect(url, queue, size, LEASE).await?),
             _ => Arc::new(InProcess::new(size, Arc::new(GaitSolver)).with_lower_priority()),
@@ -114,9 +89,9 @@ impl ServeCommand {
             let scheduler = scheduler.clone();
             async move { Box::pin(scheduler.run()).await }
         });
-        let chores = tokio::spawn(run_maintenance(scheduler.clone(), store.clone(), access_log_days, backups));
+        let chores = tokio::spawn(run_maintenance(scheduler.clone(), store.clone(), plan.access_log_days, backups));
         tracing::info!(database = %database.display(), workers = scheduler.workers(), "listening on {origin}");
-        if !local && scheme == "http" && !proxies.are_any() {
+        if !plan.listen.ip().is_loopback() && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted");
         }
         if let Some(secret) = link {
@@ -142,13 +117,16 @@ impl ServeCommand {
             }
         });
         let service = app.into_make_service_with_connect_info::<SocketAddr>();
-        let listener = LimitedListener::new(listener, limits, proxies).map_err(cannot_listen)?;
+        let listener = LimitedListener::new(listener, plan.connections.within_descriptors(), proxies)
+            .map_err(|e| plan.cannot_listen(&e))?;
         let mut server = Server::<Peer>::from_listener(listener).handle(handle);
         cut_off_silence(server.http_builder());
-        let served = match tls {
-            #[cfg(feature = "tls")]
+        #[cfg(not(feature = "tls"))]
+        let served = server.http1_only().serve(service).await;
+        #[cfg(feature = "tls")]
+        let served = match acceptor {
             Some(acceptor) => server.acceptor(acceptor).http1_only().serve(service).await,
-            _ => server.http1_only().serve(service).await,
+            None => server.http1_only().serve(service).await,
         };
         scheduler.stop();
         work.await.map_err(|e| Error::Internal(e.to_string()))??;

@@ -91,6 +91,7 @@ pub use id::{
     LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, SolveJobId,
     StudyId, SubjectId, TokenId, TrialId, UserId,
 };
+pub use record_lock::is_open_elsewhere;
 pub use schema_versions::SCHEMA_VERSION;
 pub use time::{Instant, now, set_machine_clock};
 pub use writer::Writer;

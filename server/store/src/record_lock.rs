@@ -49,6 +49,12 @@ impl RecordLock {
     }
 }
 
+/// Whether a process owns the record. Creates nothing.
+pub fn is_open_elsewhere(path: &Path) -> bool {
+    let lock = path_with_suffix(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
+    File::open(lock).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
 /// Refuses a file with hard links, because SQLite's log and our lock file would exist once for each name.
 fn refuse_second_name(path: &Path) -> StoreResult<()> {
     #[cfg(unix)]

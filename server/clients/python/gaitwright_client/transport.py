@@ -43,6 +43,10 @@ class Transport:
         timeout_s: float = 60.0,
         context: Optional[ssl.SSLContext] = None,
     ) -> None:
+        """Raises `ValueError` for an address that is not `http://HOST` or `https://HOST`, with a port or without."""
+        parts = urllib.parse.urlsplit(address)
+        if parts.scheme not in ("http", "https") or not parts.hostname:
+            raise ValueError(f"address: {address!r} must begin with http:// or https:// and name a host")
         self.address = address.rstrip("/")
         self.token = token
         self.tries = tries

@@ -36,6 +36,11 @@ impl Settings {
         Self::resolve(flags, |name| std::env::var(name).ok())
     }
 
+    /// Reads flags and environment, without a file.
+    pub(super) fn without_file(flags: &Flags) -> Self {
+        Self::of(flags, |name| std::env::var(name).ok(), Path::new(DEFAULT_FILE), &BTreeMap::new())
+    }
+
     fn resolve(flags: &Flags, environment: impl Fn(&str) -> Option<String>) -> Result<Self, Error> {
         let named = flags.record.record.config.clone();
         let (path, file) = match named.or_else(|| environment(FILE_VARIABLE).map(PathBuf::from)) {
@@ -46,6 +51,15 @@ impl Settings {
             ),
         };
         let file = parse(&path, file.as_deref().unwrap_or(""))?;
+        Ok(Self::of(flags, environment, &path, &file))
+    }
+
+    fn of(
+        flags: &Flags,
+        environment: impl Fn(&str) -> Option<String>,
+        path: &Path,
+        file: &BTreeMap<String, String>,
+    ) -> Self {
         let mut found = BTreeMap::new();
         for &(name, default, _) in KNOWN {
             let variable = format!("GAITWRIGHT_{}", name.to_uppercase());
@@ -54,13 +68,13 @@ impl Settings {
             } else if let Some(value) = environment(&variable) {
                 (value, SettingOrigin::Environment(variable))
             } else if let Some(value) = file.get(name) {
-                (value.clone(), SettingOrigin::File(path.clone()))
+                (value.clone(), SettingOrigin::File(path.to_owned()))
             } else {
                 (default.to_owned(), SettingOrigin::Default)
             };
             found.insert(name, value);
         }
-        Ok(Self(found))
+        Self(found)
     }
 
     fn text(&self, name: &str) -> &str {
