@@ -3,9 +3,9 @@
 //! The JSON of [`crate::Gait`] has all data of a gait.
 
 pub mod controller;
-pub mod motion_file;
+pub mod opensim_motion_file;
 mod samples;
 
 pub use controller::ControllerFile;
-pub use motion_file::motion_file;
+pub use opensim_motion_file::motion_file;
 pub use samples::RATE_RANGE_HZ;

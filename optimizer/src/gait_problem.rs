@@ -6,9 +6,9 @@
 //! | C2 (partial) hybrid zero dynamics, impact invariance, periodicity | [`virtual_constraint_rows`], [`hip_velocity_rows`], [`transitions`] |
 //! | C3 physical limits: friction, touchdown; unilateral contact, clearance | [`contact_limits`]; [`foot_clearance`] |
 //! | C4 bounds of the gait: tuned bounds, joints, torques, speed, steps | [`variable_bounds`], `joint_ranges`, [`stride`] |
-//! | C5-C7 muscle force equilibrium | [`fibre_and_tendon_force_rows`] |
+//! | C5-C7 muscle force equilibrium | [`muscle_force_and_torque_rows`] |
 //! | C8 fibre kinematics | [`fibre_collocation`] |
-//! | C9-C12 joint torques of the muscles | [`fibre_and_tendon_force_rows`] |
+//! | C9-C12 joint torques of the muscles | [`muscle_force_and_torque_rows`] |
 
 pub(crate) mod active_and_unchanged_bounds;
 pub(crate) mod active_constraint;
@@ -16,7 +16,6 @@ mod contact_force_bounds;
 pub mod contact_limits;
 mod elimination_tree;
 mod evaluation;
-pub mod fibre_and_tendon_force_rows;
 pub mod fibre_collocation;
 pub mod foot_clearance;
 mod gait_of_variables;
@@ -28,6 +27,7 @@ pub mod layout;
 pub mod margins;
 pub mod mesh_transfer;
 pub mod motion_and_contact_rows;
+pub mod muscle_force_and_torque_rows;
 pub mod objective;
 mod problem_definition;
 pub mod program_data;

@@ -22,7 +22,7 @@ pub mod limit_cycle;
 mod model_error;
 pub mod muscle;
 pub mod number_format;
-mod opensim;
+mod opensim_reading;
 mod quadrature;
 pub mod reference;
 pub mod reference_comparison;

@@ -5,7 +5,7 @@
 //! no central difference and are omitted.
 
 use crate::model_error::ModelError;
-use crate::opensim::{AngleUnit, StorageFile};
+use crate::opensim_reading::{AngleUnit, StorageFile};
 use crate::reference::{LARGEST_ANGLE_RAD, MotionRecording};
 use crate::signal_filter::{extension, filter, low_pass};
 use crate::statistics::extremes;

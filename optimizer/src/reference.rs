@@ -9,7 +9,7 @@ mod recorded_strides;
 mod reference_from_recording;
 mod reference_gait;
 
-pub use crate::opensim::AngleUnit;
+pub use crate::opensim_reading::AngleUnit;
 pub use heel_strikes::HeelStrikes;
 pub(crate) use heel_strikes::{contacts, given};
 pub use matching::{distance, nearest};

@@ -849,6 +849,7 @@ fn only_allocation_modules_name_the_allocation_tables() {
     let allowed = [
         "allocations/mod.rs",
         "allocations/balanced_draws.rs",
+        "allocations/random_sides.rs",
         "archived_allocations.rs",
         "archived_rows.rs",
         "seals/tables.rs",

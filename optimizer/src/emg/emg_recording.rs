@@ -1,7 +1,7 @@
 //! Raw EMG signals of a file, and heel strikes in it.
 
 use crate::model_error::ModelError;
-use crate::opensim::StorageFile;
+use crate::opensim_reading::StorageFile;
 use crate::reference::{contacts, given};
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 

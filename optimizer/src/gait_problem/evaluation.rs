@@ -5,7 +5,7 @@ use super::elimination_tree::elimination_tree;
 use super::program_data::{GaitProgram, Structure};
 use super::sparse_entries::{Compressed, Entries};
 use super::{
-    contact_limits, fibre_and_tendon_force_rows, fibre_collocation, hip_velocity_rows, motion_and_contact_rows,
+    contact_limits, fibre_collocation, hip_velocity_rows, motion_and_contact_rows, muscle_force_and_torque_rows,
     objective, stride, transitions, virtual_constraint_rows, zero_dynamics_collocation,
 };
 use crate::body::PointState;
@@ -82,7 +82,7 @@ impl GaitProgram {
                 virtual_constraint_rows::jacobian(self, &context, point_rows, &point, x, p, out);
                 hip_velocity_rows::jacobian(&context, point_rows, p, out);
                 contact_limits::jacobian(self, &context, point_rows, &state, x, p, out);
-                fibre_and_tendon_force_rows::jacobian(self, context.layout, point_rows, &point, p, out);
+                muscle_force_and_torque_rows::jacobian(self, context.layout, point_rows, &point, p, out);
             }
             let context = self.domain_context(x, d);
             zero_dynamics_collocation::jacobian(self, &context, rows, x, out);
@@ -115,7 +115,7 @@ impl GaitProgram {
                 motion_and_contact_rows::write_link_hessian(&link, p, out);
                 virtual_constraint_rows::hessian(self, &context, point_rows, &point, x, p, multipliers, out);
                 hip_velocity_rows::hessian(&context, point_rows, multipliers, out);
-                fibre_and_tendon_force_rows::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
+                muscle_force_and_torque_rows::hessian(self, context.layout, point_rows, &point, p, multipliers, out);
             }
             let context = self.domain_context(x, d);
             zero_dynamics_collocation::hessian(&context, rows, multipliers, out);
@@ -194,7 +194,7 @@ impl NonlinearProgram for GaitProgram {
                 virtual_constraint_rows::values(self, &context, point_rows, &point, x, values);
                 hip_velocity_rows::values(self, &context, point_rows, &point, x, values);
                 contact_limits::values(self, &context, point_rows, &point, &state, x, values);
-                fibre_and_tendon_force_rows::values(self, point_rows, &point, values);
+                muscle_force_and_torque_rows::values(self, point_rows, &point, values);
             }
             let context = self.domain_context(x, d);
             zero_dynamics_collocation::values(self, &context, rows, x, values);

@@ -2,7 +2,7 @@
 
 use super::reference_gait::{LARGEST_ANGLE_RAD, REFERENCE_COLUMNS};
 use crate::model_error::ModelError;
-use crate::opensim::{AngleUnit, StorageFile};
+use crate::opensim_reading::{AngleUnit, StorageFile};
 use crate::statistics::extremes;
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 

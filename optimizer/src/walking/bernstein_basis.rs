@@ -1,4 +1,4 @@
-//! Bezier (Bernstein) basis of degree 5 with its first four derivatives.
+//! Bernstein basis of degree 5, of which Bezier polynomials are sums, with its first four derivatives.
 
 /// Degree of the curves of the outputs.
 pub const BEZIER_DEGREE: usize = 5;
