@@ -144,11 +144,11 @@ def solve(options):
     backend = options.get("backend", "vm")
     quiet = not options.get("verbose", False)
     settings = PHASES[options.get("phases", "same")]
-    cache = options.get("cache")
+    cache, extra = options.get("cache"), options.get("ipopt", {})
     plain = Solver(problem | {"muscles": False}, backend, cache)
     assert start.size == plain.gait.layout.n, f"start has {start.size} variables, not {plain.gait.layout.n}"
     phases, setup, compilation = OrderedDict(), plain.setup_s, plain.compile_s
-    x, phases["tracking"] = plain.solve(start, settings["tracking"], quiet=quiet)
+    x, phases["tracking"] = plain.solve(start, settings["tracking"], extra, quiet)
     last = plain
     guess_s = 0.0
     if problem.get("muscles", False):
@@ -158,8 +158,8 @@ def solve(options):
         x = muscle_guess.guess(plain.gait, last.gait, x)
         guess_s = time.perf_counter() - started
         if "muscle_tracking" in settings:
-            x, phases["muscle_tracking"] = last.solve(x, settings["muscle_tracking"], quiet=quiet)
-    x, phases["cost"] = last.solve(x, settings["muscle_cost" if last is not plain else "cost"], quiet=quiet)
+            x, phases["muscle_tracking"] = last.solve(x, settings["muscle_tracking"], extra, quiet)
+    x, phases["cost"] = last.solve(x, settings["muscle_cost" if last is not plain else "cost"], extra, quiet)
     mcot, reg, _ = last.cost(x)
     final = phases["cost"]
     return {
