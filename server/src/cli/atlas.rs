@@ -1,19 +1,22 @@
 //! `gaitwright atlas`: the gait of every action of Table I, from one root gait.
 
 use super::atlas_table;
+use super::certify;
 use super::command_end::CommandEnd;
 use super::cores::cores_or;
 use super::flag_numbers::workers;
 use super::interruption::cancelled_by_signal;
+use super::lineage::Lineage;
 use super::multi_start_flags::MultiStartFlags;
 use super::out_file::OutFile;
 use super::output::tell;
 use super::problem_flags::ProblemFlags;
+use super::solve_file;
 use clap::Args;
 use gait_optimizer::TunedBounds;
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::atlas;
+use gaitwright_service::studies::atlas::{self, BestGaitSearch};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +30,10 @@ pub(super) struct AtlasCommand {
     /// the process is killed, run the same command again to continue.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
+    /// When the atlas is complete, certify its gaits, the lowest Gait RMSE first, until one passes, and write that gait to
+    /// this file (JSON), as `solve --out` does.
+    #[arg(long, value_name = "FILE.json")]
+    best: Option<PathBuf>,
     /// Number of solves that run in parallel (default: number of cores). The result does not depend on it.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
@@ -39,6 +46,8 @@ impl AtlasCommand {
         let start = self.flags.warm_start(None)?.map(|start| start.point);
         let cancel = cancelled_by_signal();
         let mut out = OutFile::open(&self.out, &self.flags.inputs())?;
+        let best = self.best.as_deref().map(|best| OutFile::open(best, &self.flags.inputs())).transpose()?;
+        let stopped = cancel.clone();
         let progress_path = progress_path(&self.out);
         let workers = cores_or(self.workers);
         tell(&format!("solves so far: {}", progress_path.display()));
@@ -61,11 +70,43 @@ impl AtlasCommand {
         let path = out.path().display().to_string();
         out.finish()?;
         tell(&format!("{}; written to {path}", finished.map.in_words()));
+        let finished = match best {
+            None => finished,
+            Some(file) => {
+                let mut observer = |number| tell(&format!("certifying gait {number}"));
+                let search = pool.run(move |pool| {
+                    let found = finished.best_certified_gait(pool, &mut observer, &stopped);
+                    found.map(|found| (finished, found))
+                });
+                let (finished, found) = search.await??;
+                if matches!(found, BestGaitSearch::Cancelled) {
+                    tell("stopped; run the same command again to continue");
+                    return Ok(CommandEnd::Interrupted);
+                }
+                write_best(found, file)?;
+                finished
+            }
+        };
         if let Err(e) = finished.forget_progress() {
             tell(&format!("gaitwright: cannot remove the progress file: {e}"));
         }
         Ok(CommandEnd::Done)
     }
+}
+
+fn write_best(found: BestGaitSearch, file: OutFile) -> Result<(), Error> {
+    let BestGaitSearch::Found { best, failed } = found else {
+        return Err(Error::Malformed("No gait of the atlas passes its certificate.".to_owned()));
+    };
+    let path = file.path().display().to_string();
+    file.write(&solve_file::text(&best.outcome, &Lineage::of(&best.outcome, None))?)?;
+    let (number, rmse) = (best.number, best.outcome.report.gait_rmse_rad);
+    tell(&format!("best certified gait: gait {number}, Gait RMSE {rmse:.4} rad; written to {path}"));
+    if failed > 0 {
+        tell(&format!("gaits with a lower Gait RMSE that failed their certificates: {failed}"));
+    }
+    tell(&certify::for_people(&best.certificate));
+    Ok(())
 }
 
 fn progress_path(out: &Path) -> PathBuf {

@@ -37,6 +37,7 @@ mod service_plan;
 mod settings;
 mod simulate;
 mod solve;
+mod solve_file;
 mod subject_flags;
 mod sweep;
 #[cfg(feature = "tls")]

@@ -11,6 +11,7 @@ use super::out_file::OutFile;
 use super::output::{data, tell};
 use super::problem_flags::ProblemFlags;
 use super::reference_comparison;
+use super::solve_file;
 use clap::Args;
 use gait_optimizer::certificate::{Certificate, certify};
 use gait_optimizer::explanation::{self, Explanation};
@@ -95,14 +96,6 @@ struct PrintedSolve<'a> {
     explanation: Option<&'a Explanation>,
     #[serde(skip_serializing_if = "Option::is_none")]
     sensitivities: Option<&'a GaitSensitivities>,
-}
-
-/// The content of the output file.
-#[derive(Debug, Serialize)]
-struct SolveFile<'a> {
-    #[serde(flatten)]
-    outcome: &'a SolveOutcome,
-    lineage: &'a Lineage,
 }
 
 impl SolveCommand {
@@ -197,8 +190,7 @@ impl SolveCommand {
             return Ok(CommandEnd::Interrupted);
         }
         if let Some(out) = out {
-            let kept = SolveFile { outcome: &outcome, lineage: &lineage };
-            out.write(&serde_json::to_string(&kept).map_err(|e| Error::Internal(e.to_string()))?)?;
+            out.write(&solve_file::text(&outcome, &lineage)?)?;
         }
         let was_stopped = explain && !converged && stopped.is_cancelled();
         Ok(if was_stopped { CommandEnd::Interrupted } else { CommandEnd::Done })

@@ -146,12 +146,12 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::gait_values::GaitValues;
     use super::*;
     use gait_optimizer::{SolveStatus, UnchangedBound};
 
-    fn solved(space: &SearchSpace, action: u64, free: &[&str], converged: bool) -> SolvedAction {
+    pub(in super::super) fn solved(space: &SearchSpace, action: u64, free: &[&str], converged: bool) -> SolvedAction {
         let values = space.values(ActionIndex(action));
         let bounds = space.dimensions().iter().zip(values).map(|(dimension, value)| {
             let end = (!free.contains(&dimension.name.as_str())).then_some(value);

@@ -1,11 +1,14 @@
 //! An atlas: the gait of every action of Table I, from one root gait. It does not depend on the number of workers, and a killed
 //! process can continue it.
 
+mod best_gait;
+mod family;
 mod gait_map;
 mod gait_values;
 mod progress_file;
 mod solved_action;
 
+pub use best_gait::{BestGait, BestGaitSearch};
 pub use gait_map::{AtlasRow, GaitMap};
 pub use gait_values::GaitValues;
 pub use solved_action::SolvedAction;
@@ -13,6 +16,7 @@ pub use solved_action::SolvedAction;
 use super::bound_grid;
 use super::problem_file::SolveInput;
 use crate::error::Error;
+use family::Family;
 use gait_learner::ActionIndex;
 use gait_optimizer::{CancelToken, GaitProblem, SolveOptions, SolveStatus, TunedBounds, WarmStart, solve};
 use gaitwright_compute::OnPool;
@@ -24,13 +28,6 @@ use std::sync::{Mutex, PoisonError};
 /// Number of solves between two looks at which actions have a known gait. A constant, so that the atlas does not depend
 /// on the number of workers.
 const BATCH: usize = 16;
-
-/// What the solves have in common.
-struct Family {
-    problem: GaitProblem,
-    options: SolveOptions,
-    root: WarmStart,
-}
 
 /// Makes or continues an atlas. `start` is the warm start of the root, which otherwise is a cold start; `progress` keeps the
 /// solves until [`Finished::forget_progress`]. Calls `observer` before each batch. `None` if cancelled.
@@ -54,17 +51,32 @@ pub fn make(
     let action = bound_grid::nearest_action(&space, family.problem.bounds).map_err(Error::Learner)?;
     let mut map = GaitMap::new(space, SolvedAction { action, ..root.solved });
     let is_complete = solve_all(&family, &mut map, &mut progress, workers, observer, cancel)?;
-    Ok(is_complete.then_some(Finished { map, progress }))
+    Ok(is_complete.then_some(Finished { map, family, progress }))
 }
 
 /// A complete atlas.
 pub struct Finished {
     /// The gait of each action.
     pub map: GaitMap,
+    family: Family,
     progress: ProgressFile,
 }
 
 impl Finished {
+    /// Certifies the gaits, the lowest Gait RMSE first, until one passes. Calls `observer` with the number of each gait before
+    /// its certificate.
+    ///
+    /// # Errors
+    /// Errors of the optimiser.
+    pub fn best_certified_gait(
+        &self,
+        pool: &OnPool,
+        observer: &mut dyn FnMut(u32),
+        cancel: &CancelToken,
+    ) -> Result<BestGaitSearch, Error> {
+        best_gait::search(pool, &self.family, &self.map, observer, cancel)
+    }
+
     /// Deletes the progress file, once the atlas was written elsewhere.
     ///
     /// # Errors
