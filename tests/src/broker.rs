@@ -11,19 +11,25 @@ pub struct Broker {
     folder: TempDir,
     port: u16,
     process: Child,
+    arguments: &'static [&'static str],
 }
 
 impl Broker {
     /// Starts one. `None`, with the reason on stderr: if this machine has no nats-server and none is required.
     pub fn start() -> Option<Self> {
+        Self::start_with(&[])
+    }
+
+    /// The same with further arguments of nats-server.
+    pub fn start_with(arguments: &'static [&'static str]) -> Option<Self> {
         if Command::new("nats-server").arg("--version").output().is_err() {
             skipped_unless_required("GAITWRIGHT_REQUIRE_NATS", "there is no nats-server");
             return None;
         }
         let folder = tempfile::tempdir().unwrap();
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let process = run(&folder, port);
-        Some(Self { folder, port, process })
+        let process = run(&folder, port, arguments);
+        Some(Self { folder, port, process, arguments })
     }
 
     /// Its address.
@@ -34,14 +40,14 @@ impl Broker {
     /// Kills the broker and restarts it with its stored data.
     pub fn restart(&mut self) {
         self.kill();
-        self.process = run(&self.folder, self.port);
+        self.process = run(&self.folder, self.port, self.arguments);
     }
 
     /// Kills the broker and restarts it without data.
     pub fn wipe(&mut self) {
         self.kill();
         self.folder = tempfile::tempdir().unwrap();
-        self.process = run(&self.folder, self.port);
+        self.process = run(&self.folder, self.port, self.arguments);
     }
 
     /// Kills the broker, until it is restarted.
@@ -57,10 +63,11 @@ impl Drop for Broker {
     }
 }
 
-fn run(folder: &TempDir, port: u16) -> Child {
+fn run(folder: &TempDir, port: u16, arguments: &[&str]) -> Child {
     let mut process = Command::new("nats-server")
         .args(["-js", "-a", "127.0.0.1", "-p", &port.to_string(), "-sd"])
         .arg(folder.path())
+        .args(arguments)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()

@@ -23,6 +23,7 @@ pub mod measured;
 pub mod page_routes;
 pub mod read_allocations;
 pub mod scripted;
+pub mod serve_process;
 pub mod service;
 pub mod simulated;
 pub mod skipped;

@@ -7,6 +7,7 @@ use axum::http::StatusCode;
 use gaitwright_store::set_machine_clock;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
+use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use gaitwright_tests::well_formed::WellFormed;
 use serde_json::json;
@@ -34,4 +35,10 @@ async fn report_after_a_review_applies_although_the_clock_was_set_back() {
     let reports = service.fetch(&format!("/api/v1/studies/{study}/safety-reports")).await.items();
     assert_eq!((&reports[0]["in_force"], &reports[1]["in_force"]), (&json!(false), &json!(true)), "{reports}");
     service.stop().await;
+    // The record has rows of an hour ahead, and nobody has signed in.
+    let doctor = ["doctor", "--database", "a.db", "--listen", "127.0.0.1:0"];
+    let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &doctor);
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("error   clock") && text.contains("the clock was set back"), "{text}");
 }

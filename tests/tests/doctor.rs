@@ -6,15 +6,20 @@ use gaitwright_store::{Store, access_clock, commit};
 use gaitwright_tests::broker::Broker;
 use gaitwright_tests::cli;
 use gaitwright_tests::every_table::filled;
+use gaitwright_tests::serve_process::Process;
+use gaitwright_tests::skipped::skipped;
 use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection};
 use std::path::Path;
+use std::process::Command;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
 /// Its exit code, and its lines. It checks any free port, unless the arguments name an address.
 fn doctor(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
     let address: &[&str] = if arguments.contains(&"--listen") { &[] } else { &["--listen", "127.0.0.1:0"] };
     let arguments: Vec<&str> = ["doctor"].iter().chain(address).chain(arguments).copied().collect();
-    let output = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder, &arguments);
+    let output = cli::run(BINARY, folder, &arguments);
     let text = String::from_utf8(output.stdout).unwrap();
     (output.status.code(), text.lines().map(str::to_owned).collect())
 }
@@ -103,7 +108,7 @@ fn doctor_names_settings_with_which_the_service_does_not_start() {
     for (flags, named) in [
         (&["--listen", "nonsense"][..], "listen"),
         (&["--backup-folder", "missing"], "backup_folder"),
-        (&["--anchor", "missing/anchor"], "the folder missing"),
+        (&["--anchor", "missing/anchor"], "There is no folder missing"),
         (&["--tls-certificate", "missing", "--tls-key", "missing"], "the certificate missing"),
         (&["--listen", "0.0.0.0:0", "--no-sign-in"], "without sign-in"),
     ] {
@@ -128,7 +133,7 @@ fn doctor_refuses_a_certificate_that_the_service_refuses() {
     let flags = ["--tls-certificate", "c.pem", "--tls-key", "k.pem", "--listen", "127.0.0.1:0"];
     let found = only_error(doctor(folder.path(), &flags));
     let arguments: Vec<&str> = ["serve"].into_iter().chain(flags).collect();
-    let serve = cli::run(env!("CARGO_BIN_EXE_gaitwright-cli"), folder.path(), &arguments);
+    let serve = cli::run(BINARY, folder.path(), &arguments);
     assert!(!serve.status.success());
     let refused = String::from_utf8(serve.stderr).unwrap();
     let (_, reason) = found.split_once("tls").expect("the check of the certificate");
@@ -144,16 +149,83 @@ fn doctor_reports_a_port_in_use() {
     assert!(found.contains(&format!("Cannot listen on {address}")), "{found}");
 }
 
-#[tokio::test]
-async fn doctor_accepts_the_address_of_a_service_that_has_the_record_open() {
+#[test]
+fn doctor_tells_the_running_service_from_another_program_at_its_address() {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(&folder.path().join("a.db")).await.unwrap();
-    let service = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-    let flags = ["--database", "a.db", "--listen", &service.local_addr().unwrap().to_string()];
-    let (code, lines) = doctor(folder.path(), &flags);
+    let process = Process::start(BINARY, folder.path(), &["--no-sign-in", "--database", "a.db"], "listening on ");
+    let (code, lines) = doctor(folder.path(), &["--database", "a.db", "--listen", process.address()]);
     assert_eq!(code, Some(0), "{lines:?}");
-    assert!(line(&lines, "address").contains("the service seems to be running"), "{lines:?}");
-    store.close().await;
+    assert!(line(&lines, "address").contains("the service is running on"), "{lines:?}");
+    let other = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = other.local_addr().unwrap().to_string();
+    let found = only_error(doctor(folder.path(), &["--database", "a.db", "--listen", &address]));
+    assert!(found.contains(&format!("Cannot listen on {address}")), "{found}");
+}
+
+#[tokio::test]
+async fn doctor_reports_a_lost_record() {
+    let (folder, database) = filled().await;
+    std::fs::remove_file(&database).unwrap();
+    let record = only_error(doctor(folder.path(), &["--database", "a.db"]));
+    assert!(record.contains("There is no record at a.db"), "{record}");
+}
+
+#[cfg(unix)]
+#[test]
+fn doctor_does_not_wait_for_a_pipe_in_place_of_the_record() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(Command::new("mkfifo").arg(folder.path().join("a.db")).status().unwrap().success());
+    let record = only_error(doctor(folder.path(), &["--database", "a.db"]));
+    assert!(record.contains("a.db is not a file"), "{record}");
+}
+
+#[tokio::test]
+async fn doctor_accepts_a_second_anchor_that_the_service_will_make() {
+    let (folder, _) = filled().await;
+    let (code, lines) = doctor(folder.path(), &["--database", "a.db", "--anchor", "./second"]);
+    assert_eq!(code, Some(0), "{lines:?}");
+}
+
+#[tokio::test]
+async fn doctor_reports_a_backup_folder_of_another_record() {
+    let (folder, _) = filled().await;
+    let copies = folder.path().join("copies");
+    std::fs::create_dir(&copies).unwrap();
+    std::fs::write(copies.join("a.db.owner"), "/other/a.db\n").unwrap();
+    let flags = ["--database", "a.db", "--backup-folder", "copies"];
+    let folders = only_error(doctor(folder.path(), &flags));
+    assert!(folders.contains("/other/a.db"), "{folders}");
+}
+
+#[test]
+fn doctor_reports_an_expired_certificate() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("e.ext"), "subjectAltName=DNS:localhost\n").unwrap();
+    let openssl = |arguments: &[&str]| Command::new("openssl").args(arguments).current_dir(folder.path()).output();
+    let key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", "k.pem"];
+    let request = [&["req"], &key[..], &["-out", "c.csr", "-subj", "/CN=localhost"]].concat();
+    let Ok(made) = openssl(&request) else { return skipped("openssl is needed") };
+    assert!(made.status.success(), "{made:?}");
+    let flags = ["--tls-certificate", "c.pem", "--tls-key", "k.pem"];
+    for (days, expired) in [("2", false), ("-1", true)] {
+        let sign = ["x509", "-req", "-in", "c.csr", "-signkey", "k.pem", "-extfile", "e.ext", "-out", "c.pem", "-days"];
+        let made = openssl(&[&sign[..], &[days]].concat()).unwrap();
+        assert!(made.status.success(), "{made:?}");
+        let (code, lines) = doctor(folder.path(), &flags);
+        assert_eq!(code, Some(i32::from(expired)), "{lines:?}");
+        assert_eq!(line(&lines, "tls").contains("has expired"), expired, "{lines:?}");
+    }
+}
+
+#[test]
+fn doctor_signs_in_to_a_broker_with_the_password_of_its_address() {
+    let Some(broker) = Broker::start_with(&["--user", "lab", "--pass", "p@ss/word"]) else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let url = |password: &str| broker.url().replace("nats://", &format!("nats://lab:{password}@"));
+    let (code, lines) = doctor(folder.path(), &["--nats", &url("p%40ss%2Fword")]);
+    assert_eq!(code, Some(0), "{lines:?}");
+    let refused = only_error(doctor(folder.path(), &["--nats", &url("wrong")]));
+    assert!(refused.contains("authorization") && !refused.contains("wrong"), "{refused}");
 }
 
 #[test]

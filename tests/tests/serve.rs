@@ -8,69 +8,20 @@ use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use gaitwright_tests::cli::run;
 use gaitwright_tests::client::{get, send};
+use gaitwright_tests::serve_process::Process;
 use gaitwright_tests::skipped::skipped;
-use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::thread::JoinHandle;
+use std::process::Command;
 use std::time::{Duration, Instant, SystemTime};
 
-/// A service as a process, killed when dropped.
-struct Process {
-    child: Child,
-    /// Its output until it was ready.
-    said: Vec<String>,
-    /// Its output from then on.
-    later: Option<JoinHandle<Vec<String>>>,
-    origin: String,
-}
-
-impl Process {
-    fn start(folder: &Path, arguments: &[&str], ready: &str) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_gaitwright-cli"));
-        command.args(["serve", "--listen", "127.0.0.1:0", "--workers", "1"]).args(arguments).current_dir(folder);
-        Self::watch(command, ready)
-    }
-
-    fn watch(mut command: Command, ready: &str) -> Self {
-        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
-        let mut said = Vec::new();
-        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
-        while !said.last().is_some_and(|line: &String| line.contains(ready)) {
-            let line = lines.next().unwrap_or_else(|| panic!("it ended before it was ready: {said:?}"));
-            said.push(line.unwrap());
-        }
-        // Reads later output, so that the pipe does not fill up.
-        let later = std::thread::spawn(move || lines.map_while(Result::ok).collect());
-        let listening = said.iter().find(|line| line.contains("listening on ")).unwrap();
-        let origin = listening.split("listening on ").nth(1).unwrap().split_whitespace().next().unwrap().to_owned();
-        Self { child, said, later: Some(later), origin }
-    }
-
-    fn address(&self) -> &str {
-        self.origin.split("://").nth(1).unwrap()
-    }
-
-    /// Stops the service and returns its output after it was ready.
-    fn end(mut self) -> Vec<String> {
-        self.child.kill().unwrap();
-        self.later.take().unwrap().join().unwrap()
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        // It may have ended by itself already.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
+const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
 #[test]
 fn first_start_prints_a_sign_in_link_that_works_once() {
     let folder = tempfile::tempdir().unwrap();
-    let process = Process::start(folder.path(), &[], "sign in");
+    let process = Process::start(BINARY, folder.path(), &[], "sign in");
     let line = process.said.last().unwrap();
     let path = line.split(process.address()).nth(1).unwrap().to_owned();
     assert_eq!(get(process.address(), "/api/v1/studies").unwrap().status, 401);
@@ -86,7 +37,7 @@ fn first_start_prints_a_sign_in_link_that_works_once() {
 fn one_time_links_do_not_appear_in_trace_logs() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gaitwright.toml"), "log = \"trace\"\n").unwrap();
-    let process = Process::start(folder.path(), &[], "sign in");
+    let process = Process::start(BINARY, folder.path(), &[], "sign in");
     let path = process.said.last().unwrap().split(process.address()).nth(1).unwrap().to_owned();
     let secret = path.rsplit('/').next().unwrap().to_owned();
     assert_eq!(get(process.address(), &path).unwrap().status, 200);
@@ -102,7 +53,7 @@ fn one_time_links_do_not_appear_in_trace_logs() {
 #[test]
 fn connections_without_a_complete_request_are_closed() {
     let folder = tempfile::tempdir().unwrap();
-    let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    let process = Process::start(BINARY, folder.path(), &["--no-sign-in"], "listening on ");
     let silent = |said: &'static str| {
         let mut stream = TcpStream::connect(process.address()).unwrap();
         std::thread::spawn(move || {
@@ -121,7 +72,8 @@ fn connections_without_a_complete_request_are_closed() {
 fn system_page_lists_scheduled_backups() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("copies")).unwrap();
-    let process = Process::start(folder.path(), &["--no-sign-in", "--backup-folder", "copies"], "listening on ");
+    let process =
+        Process::start(BINARY, folder.path(), &["--no-sign-in", "--backup-folder", "copies"], "listening on ");
     let listed = || get(process.address(), "/system").unwrap().body.contains(".scheduled-");
     assert!((0..200).any(|_| {
         std::thread::sleep(Duration::from_millis(50));
@@ -139,7 +91,8 @@ fn failing_scheduled_backups_are_shown() {
         let made = SystemTime::now() - Duration::from_hours(24) + Duration::from_secs(seconds);
         std::fs::File::create(copies.join("gaitwright.db.scheduled-1")).unwrap().set_modified(made).unwrap();
         let begun = Instant::now();
-        let process = Process::start(folder.path(), &["--no-sign-in", "--backup-folder", "copies"], "listening on ");
+        let process =
+            Process::start(BINARY, folder.path(), &["--no-sign-in", "--backup-folder", "copies"], "listening on ");
         std::fs::remove_dir_all(&copies).unwrap();
         (begun.elapsed().as_secs() < seconds).then_some(process)
     };
@@ -157,7 +110,7 @@ fn failing_scheduled_backups_are_shown() {
 fn log_format_json_writes_json_lines() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("gaitwright.toml"), "log_format = \"json\"\n").unwrap();
-    let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    let process = Process::start(BINARY, folder.path(), &["--no-sign-in"], "listening on ");
     let line: serde_json::Value = serde_json::from_str(process.said.last().unwrap()).unwrap();
     assert_eq!((&line["level"], &line["fields"]["workers"]), (&"INFO".into(), &1.into()), "{line}");
     assert!(line["timestamp"].is_string() && line["target"].as_str().unwrap().starts_with("gaitwright"), "{line}");
@@ -167,7 +120,7 @@ fn log_format_json_writes_json_lines() {
 #[test]
 fn term_signal_shuts_the_service_down_cleanly() {
     let folder = tempfile::tempdir().unwrap();
-    let mut process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    let mut process = Process::start(BINARY, folder.path(), &["--no-sign-in"], "listening on ");
     assert_eq!(get(process.address(), "/api/v1/studies").unwrap().status, 200);
     let killed = Command::new("kill").args(["-TERM", &process.child.id().to_string()]).status().unwrap();
     assert!(killed.success());
@@ -191,7 +144,7 @@ fn https_is_served_with_a_certificate_from_files() {
     };
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let tls = ["--no-sign-in", "--tls-certificate", "c.pem", "--tls-key", "k.pem"];
-    let process = Process::start(folder.path(), &tls, "listening on ");
+    let process = Process::start(BINARY, folder.path(), &tls, "listening on ");
     assert!(process.origin.starts_with("https://"), "{}", process.origin);
     let answer = Command::new("curl")
         .args(["--silent", "--show-error", "--include", "--cacert", "c.pem", &format!("{}/health", process.origin)])
@@ -249,7 +202,7 @@ fn bodies_sent_in_single_bytes_use_little_memory() {
     const CONNECTIONS: usize = 8;
     const BYTES: usize = 8000;
     let folder = tempfile::tempdir().unwrap();
-    let process = Process::start(folder.path(), &["--no-sign-in"], "listening on ");
+    let process = Process::start(BINARY, folder.path(), &["--no-sign-in"], "listening on ");
     assert_eq!(get(process.address(), "/health").unwrap().status, 200);
     let before = peak_memory_mib(&process);
     let head = "POST /sign-in HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/x-www-form-urlencoded\r\n\
@@ -344,7 +297,7 @@ async fn service_prints_a_sign_in_link_if_all_administrators_are_disabled() {
     for arguments in [&[][..], &["--sign-in-link"]] {
         let folder = tempfile::tempdir().unwrap();
         disable_every_administrator(folder.path()).await;
-        let process = Process::start(folder.path(), arguments, "sign in");
+        let process = Process::start(BINARY, folder.path(), arguments, "sign in");
         let path = process.said.last().unwrap().split(process.address()).nth(1).unwrap().to_owned();
         let first = send(process.address(), "POST", &path, "").unwrap();
         assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
@@ -370,7 +323,7 @@ async fn users_link_command_prints_a_working_sign_in_link() {
     assert_eq!(run(&["users", "link", "Bob"]).status.code(), Some(2));
     assert_eq!(run(&["users", "link", "admin"]).status.code(), Some(2), "who is disabled gets none");
     let link = String::from_utf8(run(&["users", "link", "ada"]).stdout).unwrap();
-    let process = Process::start(folder.path(), &[], "sign in");
+    let process = Process::start(BINARY, folder.path(), &[], "sign in");
     let first = send(process.address(), "POST", link.trim(), "").unwrap();
     assert!(first.head.to_lowercase().contains("set-cookie: gaitwright_session="), "{}", first.head);
     for (arguments, instead) in

@@ -19,6 +19,10 @@ DESCRIPTION = pathlib.Path(__file__).resolve().parent.parent.parent / "openapi.j
 Answer = Optional[tuple[int, Any, dict[str, str]]]
 
 
+# Content of an answer that breaks off in its headers.
+BREAKS_OFF = object()
+
+
 class Service:
     """Gives prepared answers, and keeps the requests."""
 
@@ -37,6 +41,10 @@ class Service:
                     self.close_connection = True
                     return
                 status, content, more = answer
+                if content is BREAKS_OFF:
+                    self.wfile.write(b"HTTP/1.1 200 OK\r\ncontent-type: appl")
+                    self.close_connection = True
+                    return
                 data = content if isinstance(content, bytes) else json.dumps(content).encode()
                 self.send_response(status)
                 for name, value in {"content-length": str(len(data)), **more}.items():
@@ -79,6 +87,15 @@ class Requests(unittest.TestCase):
             self.assertEqual(service.client.cancel_trial("t")["id"], "t")
         keys = {headers["idempotency-key"] for _, _, headers, _ in service.requests}
         self.assertEqual((len(service.requests), len(keys)), (4, 1))
+
+    def test_request_whose_answer_breaks_off_in_the_headers_is_sent_again(self) -> None:
+        with Service((200, BREAKS_OFF, {}), (200, {"id": "t"}, {})) as service:
+            self.assertEqual(service.client.cancel_trial("t")["id"], "t")
+        self.assertEqual(len(service.requests), 2)
+
+    def test_another_program_at_the_address_is_named(self) -> None:
+        with Service((200, b"<html>", {})) as service, self.assertRaisesRegex(ValueError, "no Gaitwright service"):
+            service.client.get_caller()
 
     def test_operation_that_returns_a_secret_is_sent_once_without_a_key(self) -> None:
         with Service(None) as service, self.assertRaises(OSError):

@@ -1,10 +1,10 @@
 """The Debian package: the program, its systemd unit and an empty file of settings."""
 
 import hashlib
-from typing import Tuple
+from typing import Dict, Tuple
 
 from archives import File, ar, tar_gz
-from contents import LICENCES, examples, readme, unit
+from contents import examples, readme, unit
 
 DEBIAN_NAME = "gaitwright_{version}_{architecture}.deb"
 CONTROL = """Package: gaitwright
@@ -31,10 +31,10 @@ if [ "$1" = remove ] && [ -d /run/systemd/system ]; then systemctl disable --now
 SETTINGS = "# Settings of `gaitwright serve`; `gaitwright config show` lists them. The unit sets the folder of the record.\n"
 
 
-def deb(program: bytes, version: str, architecture: str, glibc: Tuple[int, int]) -> bytes:
+def deb(program: bytes, licences: Dict[str, bytes], version: str, architecture: str, glibc: Tuple[int, int]) -> bytes:
     """The package of a program that needs this version of glibc."""
     documents = {
-        "copyright": b"\n".join(LICENCES.values()),
+        "copyright": b"\n".join(licences.values()),
         **readme(),
         **{f"examples/{example}": content for example, content in examples().items()},
     }

@@ -7,9 +7,13 @@ use clap::Args;
 use gaitwright_service::error::Error;
 #[cfg(feature = "nats")]
 use gaitwright_service::workers::nats;
-use gaitwright_store::{SCHEMA_VERSION, access_clock, free_bytes, is_open_elsewhere, now, verify};
+use gaitwright_store::backup_folder::BackupFolder;
+use gaitwright_store::{SCHEMA_VERSION, access_clock, check_path, free_bytes, is_open_elsewhere, now, verify};
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, Ipv6Addr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
+use std::time::Duration;
 
 /// How far another machine's clock may be ahead without notice, s.
 const CLOCKS_DIFFER_S: i64 = 5;
@@ -20,12 +24,19 @@ pub(super) struct DoctorCommand {
     flags: Box<Flags>,
 }
 
+/// How long a running service may take to answer.
+const HEALTH_WITHIN: Duration = Duration::from_secs(2);
+/// Longest answer that is read, bytes.
+const LONGEST_HEALTH: u64 = 4096;
+
+const VALID_SETTINGS: &str = "needs valid settings";
+
 /// The outcome of a check.
 enum CheckOutcome {
     Good(String),
     Trouble(String),
-    /// The error of another check prevents this one.
-    Skipped,
+    /// The check needs what another one found in trouble.
+    Skipped(&'static str),
 }
 use CheckOutcome::{Good, Skipped, Trouble};
 
@@ -51,19 +62,14 @@ impl DoctorCommand {
                 settings.reserve_bytes().map_or_else(|e| Trouble(e.to_string()), |reserve| disk(&database, reserve)),
             ),
         ];
-        if database.exists() {
-            checks.push(("record", record(&database, settings.anchor().as_slice()).await));
-            checks.push(("clock", clock_after(&database).await));
-        } else {
-            checks.push(("record", Good(format!("no record yet at {}", database.display()))));
-            checks.push(("clock", Good(now().to_string())));
-        }
+        checks.push(("record", record(&database, settings.anchor().as_deref()).await));
+        checks.push(("clock", if database.is_file() { clock_after(&database).await } else { Good(now().to_string()) }));
         checks.push(("broker", broker(settings).await));
         for (what, found) in &checks {
             let (state, text) = match found {
                 Good(text) => ("ok", text.as_str()),
                 Trouble(text) => ("error", text.as_str()),
-                Skipped => ("skipped", "needs valid settings"),
+                Skipped(needs) => ("skipped", *needs),
             };
             data(&format!("{state:<8}{what:<9}{text}"))?;
         }
@@ -80,7 +86,7 @@ fn program() -> CheckOutcome {
 fn disk(database: &Path, reserve: u64) -> CheckOutcome {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
     match free_bytes(folder_of(database)) {
-        _ if !folder_of(database).is_dir() => Skipped,
+        _ if !folder_of(database).is_dir() => Skipped("needs the folder of the record"),
         Some(free) if free < reserve => {
             Trouble(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
         }
@@ -89,8 +95,20 @@ fn disk(database: &Path, reserve: u64) -> CheckOutcome {
     }
 }
 
-async fn record(database: &Path, anchors: &[PathBuf]) -> CheckOutcome {
-    match verify::file(database, anchors).await {
+/// Whether the record, if there is one, is intact, and not lost otherwise.
+async fn record(database: &Path, second_anchor: Option<&Path>) -> CheckOutcome {
+    let is_there = std::fs::symlink_metadata(database).is_ok();
+    if is_there && !database.is_file() {
+        return Trouble(format!("{} is not a file", database.display()));
+    }
+    match check_path(database, second_anchor) {
+        Err(error) => return Trouble(error.to_string()),
+        Ok(()) if !is_there => return Good(format!("no record yet at {}", database.display())),
+        Ok(()) => {}
+    }
+    // The service makes a second anchor that is missing.
+    let anchors = second_anchor.filter(|anchor| anchor.exists()).map(Path::to_owned);
+    match verify::file(database, anchors.as_slice()).await {
         Ok(whole) => Good(format!(
             "{} is intact: audit trail of {} rows, {} seals, anchors: {}",
             database.display(),
@@ -127,10 +145,13 @@ fn of_settings(unread_file: Option<&Error>, plan: &Result<ServicePlan, Error>) -
 #[cfg_attr(not(feature = "tls"), allow(clippy::unused_async, reason = "only reading the files waits"))]
 async fn tls(plan: &Result<ServicePlan, Error>) -> CheckOutcome {
     match plan {
-        Err(_) => Skipped,
+        Err(_) => Skipped(VALID_SETTINGS),
         #[cfg(feature = "tls")]
         Ok(plan) if plan.tls.is_some() => match plan.acceptor().await {
-            Ok(_) => Good("the certificate and its key can be used".to_owned()),
+            Ok(_) => match plan.certificate_is_valid_now() {
+                Ok(()) => Good("the certificate and its key can be used".to_owned()),
+                Err(error) => Trouble(error.to_string()),
+            },
             Err(error) => Trouble(error.to_string()),
         },
         Ok(_) => Good("no certificate is set, so the service speaks HTTP".to_owned()),
@@ -140,25 +161,52 @@ async fn tls(plan: &Result<ServicePlan, Error>) -> CheckOutcome {
 /// Whether the service can listen on its address, or the running service does.
 fn address(plan: &Result<ServicePlan, Error>, database: &Path) -> CheckOutcome {
     match plan.as_ref().map(|plan| (plan.listen, plan.listener())) {
-        Err(_) => Skipped,
+        Err(_) => Skipped(VALID_SETTINGS),
         Ok((listen, Ok(_))) => Good(format!("{listen} is free")),
-        Ok((listen, Err(_))) if is_open_elsewhere(database) => {
-            Good(format!("{listen} is in use, and so is the record: the service seems to be running"))
+        Ok((listen, Err(_))) if is_open_elsewhere(database) && answers(plan) => {
+            Good(format!("the service is running on {listen}"))
         }
         Ok((_, Err(error))) => Trouble(error.to_string()),
     }
 }
 
+/// Whether a service answers on the address. Over TLS, whatever listens there counts.
+fn answers(plan: &Result<ServicePlan, Error>) -> bool {
+    let Ok(plan) = plan else { return false };
+    let mut to = plan.listen;
+    if to.ip().is_unspecified() {
+        to.set_ip(if to.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
+    }
+    let health = || -> std::io::Result<String> {
+        let mut stream = TcpStream::connect_timeout(&to, HEALTH_WITHIN)?;
+        stream.set_read_timeout(Some(HEALTH_WITHIN))?;
+        stream.write_all(format!("GET /health HTTP/1.1\r\nhost: {to}\r\nconnection: close\r\n\r\n").as_bytes())?;
+        let mut answer = String::new();
+        stream.take(LONGEST_HEALTH).read_to_string(&mut answer)?;
+        Ok(answer)
+    };
+    plan.tls.is_some()
+        || health().is_ok_and(|answer| answer.contains(r#""status":"#) && answer.contains(r#""version":"#))
+}
+
 /// Whether the service can write to the folders of the record, the second anchor and the backups.
 fn folders(settings: &Settings, plan: &Result<ServicePlan, Error>) -> CheckOutcome {
-    let Ok(plan) = plan else { return Skipped };
-    let files = [Some(settings.database()), settings.anchor()].into_iter().flatten();
+    let Ok(plan) = plan else { return Skipped(VALID_SETTINGS) };
+    // The check of the record reports a missing folder of the anchor.
+    let of_anchor = settings.anchor().filter(|anchor| folder_of(anchor).is_dir());
+    let files = [Some(settings.database()), of_anchor].into_iter().flatten();
     let mut wanted: Vec<PathBuf> = files.map(|file| folder_of(&file).to_owned()).collect();
     wanted.extend(plan.backups.as_ref().map(|backups| backups.folder.clone()));
     let refused = wanted.iter().find_map(|folder| Some((folder, tempfile::tempfile_in(folder).err()?)));
-    match refused {
-        Some((folder, error)) => Trouble(format!("cannot write to the folder {}: {}", folder.display(), error.kind())),
-        None => Good("writable".to_owned()),
+    let claimed = match refused {
+        Some((folder, error)) => {
+            return Trouble(format!("cannot write to the folder {}: {}", folder.display(), error.kind()));
+        }
+        None => plan.backups.as_ref().map(|backups| BackupFolder::check(&settings.database(), &backups.folder)),
+    };
+    match claimed {
+        Some(Err(error)) => Trouble(error.to_string()),
+        _ => Good("writable".to_owned()),
     }
 }
 

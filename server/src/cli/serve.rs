@@ -49,6 +49,10 @@ impl ServeCommand {
         let plan = ServicePlan::of(settings)?;
         #[cfg(feature = "tls")]
         let acceptor = plan.acceptor().await?;
+        #[cfg(feature = "tls")]
+        if let Err(error) = plan.certificate_is_valid_now() {
+            tracing::warn!("{error}");
+        }
         let listener = plan.listener()?;
         let address = listener.local_addr().map_err(|e| plan.cannot_listen(&e))?;
         let (database, proxies) = (settings.database(), plan.proxies.clone());

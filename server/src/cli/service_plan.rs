@@ -83,6 +83,13 @@ impl ServicePlan {
         }
     }
 
+    /// # Errors
+    /// If the certificate is expired, or not valid yet.
+    #[cfg(feature = "tls")]
+    pub(super) fn certificate_is_valid_now(&self) -> Result<(), Error> {
+        self.tls.as_ref().map_or(Ok(()), |(certificate, _)| tls::valid_now(certificate))
+    }
+
     /// Listens on the address.
     pub(super) fn listener(&self) -> Result<TcpListener, Error> {
         let bound =

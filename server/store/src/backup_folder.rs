@@ -5,7 +5,7 @@ use super::record_file_names::free_name;
 use super::record_file_names::path_with_suffix;
 use super::{Store, StoreError, StoreResult, backup};
 use std::fs::{File, TryLockError};
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -32,8 +32,7 @@ impl BackupFolder {
     /// [`StoreError::FolderOfOther`]; a folder in which no file can be written.
     pub fn claim(store: &Store, folder: &Path) -> StoreResult<Self> {
         let record = store.path();
-        let stem = folder.join(record.file_name().unwrap_or_default());
-        let claim = path_with_suffix(&stem, ".owner");
+        let (stem, claim) = Self::names(record, folder);
         let cannot = |source| StoreError::Open { path: claim.clone(), source };
         let own = record.canonicalize().map_err(cannot)?;
         let own = own.to_string_lossy();
@@ -51,6 +50,32 @@ impl BackupFolder {
         }
         let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         Ok(Self { folder: whole, stem, _claim: file })
+    }
+
+    /// Refuses a folder that another record claimed. Creates nothing.
+    ///
+    /// # Errors
+    /// [`StoreError::FolderOfOther`], [`StoreError::Open`].
+    pub fn check(record: &Path, folder: &Path) -> StoreResult<()> {
+        let (_, claim) = Self::names(record, folder);
+        let cannot = |source| StoreError::Open { path: claim.clone(), source };
+        let mut owner = String::new();
+        match File::open(&claim) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            file => file.and_then(|file| file.take(LONGEST_PATH).read_to_string(&mut owner)).map_err(cannot)?,
+        };
+        let own = record.canonicalize().unwrap_or_else(|_| record.to_owned());
+        if owner.is_empty() || owner.trim_end() == own.to_string_lossy() {
+            return Ok(());
+        }
+        Err(StoreError::FolderOfOther { folder: folder.to_owned(), record: owner.trim_end().to_owned(), claim })
+    }
+
+    /// The stem of the backups, and the file that names the owner.
+    fn names(record: &Path, folder: &Path) -> (PathBuf, PathBuf) {
+        let stem = folder.join(record.file_name().unwrap_or_default());
+        let claim = path_with_suffix(&stem, ".owner");
+        (stem, claim)
     }
 
     /// The path of the folder.

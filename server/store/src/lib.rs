@@ -91,6 +91,7 @@ pub use id::{
     LabSessionId, MeasurementFileId, MemberId, ReferenceGaitId, SafetyReportId, SafetyReviewId, SessionId, SolveJobId,
     StudyId, SubjectId, TokenId, TrialId, UserId,
 };
+pub use opening_checks::check_path;
 pub use record_lock::is_open_elsewhere;
 pub use schema_versions::SCHEMA_VERSION;
 pub use time::{Instant, now, set_machine_clock};
@@ -175,8 +176,7 @@ impl Store {
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {
         anchor::refuse_wrong(elsewhere, path, None)?;
         sqlite_file::check(path)?;
-        let anchors: Vec<PathBuf> =
-            [Some(anchor::path_of(path)), elsewhere.map(Path::to_owned)].into_iter().flatten().collect();
+        let anchors = opening_checks::anchors(path, elsewhere);
         let mut record_lock = RecordLock::take(path)?;
         let checked = async {
             interrupted_restore::finish_interrupted(path)?;

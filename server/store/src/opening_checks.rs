@@ -3,7 +3,7 @@
 
 use super::record_file_names::path_with_suffix;
 use super::schema_versions::SchemaFile;
-use super::{StoreError, StoreResult, anchor, migrations, schema_versions, verify};
+use super::{StoreError, StoreResult, anchor, migrations, schema_versions, sqlite_file, verify};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::{Path, PathBuf};
@@ -27,6 +27,22 @@ pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
         // connection.
         _ => Ok(()),
     }
+}
+
+/// Checks a path that may have no record yet, as opening it does, and creates nothing.
+///
+/// # Errors
+/// [`StoreError::WrongAnchor`], [`StoreError::NoAnchorFolder`], [`StoreError::NotADatabase`] and
+/// [`StoreError::RecordMissing`], as [`super::Store::open_anchored`].
+pub fn check_path(path: &Path, second_anchor: Option<&Path>) -> StoreResult<()> {
+    anchor::refuse_wrong(second_anchor, path, None)?;
+    sqlite_file::check(path)?;
+    refuse_empty_in_place_of_record(path, &anchors(path, second_anchor))
+}
+
+/// The anchors of a record.
+pub(super) fn anchors(path: &Path, second: Option<&Path>) -> Vec<PathBuf> {
+    [Some(anchor::path_of(path)), second.map(Path::to_owned)].into_iter().flatten().collect()
 }
 
 /// Accepts an empty file as a new record, unless an anchor shows that there was one.

@@ -11,7 +11,7 @@ import urllib.parse
 import urllib.request
 import uuid
 from collections.abc import Mapping
-from typing import IO, Any, Optional
+from typing import Any, Optional
 
 from .problem import Problem
 
@@ -57,7 +57,11 @@ class Transport:
         self.opener = urllib.request.build_opener(*handlers)
 
     def request_json(self, verb: str, path: str, at: Optional[Mapping[str, str]] = None, **more: Any) -> Any:
-        return json.loads(self.request_bytes(verb, path, at, **more))
+        content = self.request_bytes(verb, path, at, **more)
+        try:
+            return json.loads(content)
+        except ValueError:
+            raise ValueError(f"{self.address}{path} did not answer with JSON, so it is no Gaitwright service") from None
 
     def request_text(self, verb: str, path: str, at: Optional[Mapping[str, str]] = None, **more: Any) -> str:
         return self.request_bytes(verb, path, at, **more).decode("utf-8-sig")
@@ -89,6 +93,9 @@ class Transport:
             last = attempt == self.tries
             try:
                 with self.open(request) as answer:
+                    # Every response of the service states its length; this one broke off before it did.
+                    if answer.status != 204 and answer.length is None and not answer.chunked:
+                        raise http.client.IncompleteRead(b"")
                     return answer.read()
             except Problem as problem:
                 # After a broken connection, both attempts can have run at the same time, which is a conflict.
@@ -119,10 +126,10 @@ class Transport:
             request.add_header("authorization", f"Bearer {self.token}")
         return request
 
-    def open(self, request: urllib.request.Request) -> IO[bytes]:
+    def open(self, request: urllib.request.Request) -> http.client.HTTPResponse:
         """The response. A refusal is a `Problem`."""
         try:
-            answer: IO[bytes] = self.opener.open(request, timeout=self.timeout_s)
+            answer: http.client.HTTPResponse = self.opener.open(request, timeout=self.timeout_s)
             return answer
         except urllib.error.HTTPError as error:
             with error:

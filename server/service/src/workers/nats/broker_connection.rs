@@ -6,7 +6,10 @@ use async_nats::connection::State;
 use async_nats::jetstream::consumer::{AckPolicy, PullConsumer, pull};
 use async_nats::jetstream::stream::{Config, DiscardPolicy, RetentionPolicy, Stream};
 use async_nats::jetstream::{self, Context};
+use async_nats::{ConnectOptions, ServerAddr};
 use gaitwright_store::TrialId;
+use percent_encoding::percent_decode_str;
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::time::Duration;
 
@@ -35,8 +38,9 @@ pub(super) struct BrokerConnection {
 /// # Errors
 /// [`DispatchError::Unreachable`], also if the broker has no JetStream.
 pub async fn reach(url: &str) -> Result<String, DispatchError> {
-    let options = async_nats::ConnectOptions::new().connection_timeout(REACHED_WITHIN);
-    let client = options.connect(url).await.map_err(unreachable)?;
+    let (address, options) = address_and_credentials(url)?;
+    let options = options.connection_timeout(REACHED_WITHIN);
+    let client = options.connect(address).await.map_err(unreachable)?;
     let about = client.server_info();
     if about.jetstream {
         Ok(about.version)
@@ -45,15 +49,35 @@ pub async fn reach(url: &str) -> Result<String, DispatchError> {
     }
 }
 
+/// The address, and options with its user and password, which the library does not send by itself.
+fn address_and_credentials(url: &str) -> Result<(ServerAddr, ConnectOptions), DispatchError> {
+    let address: ServerAddr = url.parse().map_err(unreachable)?;
+    let decoded = |part: &str| {
+        let decoded = percent_decode_str(part).decode_utf8();
+        decoded.map(Cow::into_owned).map_err(|_| {
+            DispatchError::Unreachable("User and password of the NATS broker must be valid UTF-8.".to_owned())
+        })
+    };
+    let options = match (address.username(), address.password()) {
+        (None, None) => ConnectOptions::new(),
+        (Some(token), None) => ConnectOptions::with_token(decoded(token)?),
+        (user, password) => {
+            ConnectOptions::with_user_and_password(decoded(user.unwrap_or(""))?, decoded(password.unwrap_or(""))?)
+        }
+    };
+    Ok((address, options))
+}
+
 impl BrokerConnection {
     /// Connects once the broker is available, and reconnects whenever the connection breaks.
     pub(super) async fn open(url: &str, queue: &str, lease: Duration) -> Result<Self, DispatchError> {
         let address = url.rsplit(['@', '/']).next().unwrap_or_default().to_owned();
-        let client = async_nats::ConnectOptions::new()
+        let (server, options) = address_and_credentials(url)?;
+        let client = options
             .name(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
             .reconnect_delay_callback(|_| AGAIN)
             .retry_on_initial_connect()
-            .connect(url)
+            .connect(server)
             .await
             .map_err(|error| {
                 DispatchError::Unreachable(format!("The NATS broker {address} cannot be reached: {error}."))
