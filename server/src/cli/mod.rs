@@ -35,6 +35,7 @@ mod resumed_study;
 mod serve;
 mod settings;
 mod simulate;
+mod simulated_walks_flags;
 mod solve;
 mod subject_flags;
 mod sweep;
