@@ -46,13 +46,16 @@ async fn finished(service: &Service, walks: &Value) -> (StudyId, Vec<Trial>) {
 
 /// The mean strides of the newest report of a trial, which must have the seed of the study.
 async fn reported(store: &Store, trial: &Trial) -> Option<f64> {
-    let kept = execution_reports::newest(&mut *store.read().await.unwrap(), trial.id).await.unwrap()?;
+    let kept = execution_reports::newest(&mut store.read().await.unwrap(), trial.id).await.unwrap()?;
     assert_eq!(kept.reported.seed, SEED);
     Some(kept.reported.report.mean_strides())
 }
 
+/// Number, action, state, Gait RMSE and mean strides of a trial.
+type Found = (u32, u64, TrialState, Option<f64>, Option<f64>);
+
 /// What a study found, without identifiers and times.
-fn results(trials: &[Trial]) -> Vec<(u32, u64, TrialState, Option<f64>, Option<f64>)> {
+fn results(trials: &[Trial]) -> Vec<Found> {
     let of = |trial: &Trial| (trial.number, trial.action_index.0, trial.state, trial.gait_rmse_rad, trial.mean_strides);
     trials.iter().map(of).collect()
 }
