@@ -137,6 +137,8 @@ create table studies (
     -- The gait from which trials are warm-started: the best one so far, or the first one of the study.
     warm_start_from      text not null
                          constraint studies_warm_start_from check (warm_start_from in ('incumbent', 'root')),
+    -- What simulated walks with each gait do.
+    simulated_walks      text not null constraint studies_simulated_walks_json check (json_valid(simulated_walks)),
     parallel_trials      integer not null constraint studies_parallel_trials check (parallel_trials between 1 and 64),
     priority             integer not null default 0 constraint studies_priority check (priority between -10 and 10),
     -- At most 53 bits, because JSON readers keep no more of an integer.
@@ -270,11 +272,15 @@ create table trials (
     script            text constraint trials_script_length check (script is null or length(script) between 1 and 80),
     state             text not null
                       constraint trials_state
-                      check (state in ('queued', 'running', 'converged', 'not_converged', 'failed', 'lost', 'cancelled')),
+                      check (state in (
+                          'queued', 'running', 'converged', 'not_converged', 'not_executable', 'failed', 'lost', 'cancelled'
+                      )),
     -- How the solve ended; null unless it ran to its end.
     status            text,
     gait_rmse_rad     real,
     cost_of_transport real,
+    -- Mean strides of the simulated walks on which the result depends; null if it does not depend on any.
+    mean_strides      real constraint trials_mean_strides check (mean_strides is null or mean_strides >= 0),
     objective         real,
     max_violation     real,
     iterations        integer,
@@ -288,8 +294,11 @@ create table trials (
     constraint trials_number_unique unique (study_id, number),
     constraint trials_converged_has_values check (
         -- A script can report a converged trial without the values of a solve.
-        state <> 'converged' or script is not null
+        state not in ('converged', 'not_executable') or script is not null
         or (gait_rmse_rad is not null and cost_of_transport is not null and report is not null)
+    ),
+    constraint trials_not_executable_has_strides check (
+        state <> 'not_executable' or (script is null and mean_strides is not null)
     ),
     constraint trials_end_has_time check (
         (state in ('queued', 'running')) = (finished_at is null)
@@ -307,7 +316,7 @@ create trigger trials_script_fixed before update of script on trials
 when old.script is not null
 begin select raise(abort, 'the script of a trial cannot be changed'); end;
 create trigger trials_result_fixed before update on trials
-when old.state in ('converged', 'not_converged')
+when old.state in ('converged', 'not_converged', 'not_executable')
 begin select raise(abort, 'the result of a trial cannot be changed'); end;
 create trigger trials_need_consent before insert on trials
 when (select subject_id from studies where id = new.study_id) in (select subject_id from withdrawn_subjects)
@@ -445,8 +454,9 @@ create table feedback (
     trial_a    text not null references trials (id),
     -- preference: the loser. no_difference: the other trial.
     trial_b    text references trials (id),
-    -- label: whether the evaluation of the trial found a gait.
-    label      text constraint feedback_label check (label in ('converged', 'not_converged')),
+    -- label: whether the evaluation of the trial found a gait, and whether simulated walks with it last.
+    label      text
+               constraint feedback_label check (label in ('converged', 'not_converged', 'not_executable')),
     -- suggestion: the index of the suggested action in the search space.
     suggested  integer,
     source     text not null

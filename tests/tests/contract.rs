@@ -43,7 +43,7 @@ async fn documents_keep_their_shape() {
     let there = snapshot.clone();
     let rank = service.store.clone().compute(move |pool| ranking_to_show(pool, &there, &Analyses::default())).await;
     let best = rank.unwrap().unwrap().first().copied();
-    let mut tune = serde_json::to_value(summary::of(&snapshot, best, BestCertification::default())).unwrap();
+    let mut tune = serde_json::to_value(summary::of(&snapshot, best, BestCertification::default(), None)).unwrap();
     tune["trials"].as_array_mut().unwrap().reverse();
     insta::assert_json_snapshot!("tune", shape(&tune));
 

@@ -75,6 +75,21 @@ pub struct ExecutionReport {
     pub pushes: Option<SurvivedPushes>,
 }
 
+impl ExecutionReport {
+    /// Mean number of completed strides, over all randomly disturbed walks; 0 without any.
+    pub fn mean_strides(&self) -> f64 {
+        let strides: f64 = self.grounds.iter().map(|on| on.mean_strides * f64::from(on.simulated_walks)).sum();
+        let walks: f64 = self.grounds.iter().map(|on| f64::from(on.simulated_walks)).sum();
+        if walks > 0.0 { strides / walks } else { 0.0 }
+    }
+
+    /// Number of complete walks and of all walks, randomly disturbed.
+    pub fn completed_of_all(&self) -> (u32, u32) {
+        let sum = |count: fn(&SimulatedWalksOnGround) -> u32| self.grounds.iter().map(count).sum();
+        (sum(|on| on.completed), sum(|on| on.simulated_walks))
+    }
+}
+
 impl SimulatedWalksOnGround {
     pub(super) fn of(ground_height_m: f64, outcomes: &[WalkOutcome]) -> Self {
         let ended = |end: WalkEnd| u32::try_from(outcomes.iter().filter(|o| o.end == end).count()).unwrap_or(u32::MAX);

@@ -22,8 +22,7 @@ pub fn lower_priority(niceness: i32) {
     let _ = niceness;
 }
 
-/// Runs work on its own thread with lower priority than solves. A panic drops the sender. Dropping the receiver
-/// abandons the thread.
+/// Runs work on its own thread with lower priority than solves, as [`run_with`].
 ///
 /// # Errors
 /// If no thread can be started.
@@ -31,9 +30,21 @@ pub fn run_below_solves<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> io::Result<oneshot::Receiver<T>> {
+    run_with(AFTERWARDS, name, work)
+}
+
+/// Runs work on its own thread with this priority. A panic drops the sender. Dropping the receiver abandons the thread.
+///
+/// # Errors
+/// If no thread can be started.
+pub fn run_with<T: Send + 'static>(
+    niceness: i32,
+    name: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<oneshot::Receiver<T>> {
     let (sender, result) = oneshot::channel();
     let work = move || {
-        lower_priority(AFTERWARDS);
+        lower_priority(niceness);
         // Fails only if the receiver was dropped.
         let _ = sender.send(work());
     };

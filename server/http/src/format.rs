@@ -8,7 +8,7 @@ use gaitwright_service::access::Role;
 use gaitwright_store::blind_pairs::OrderedAnswer;
 use gaitwright_store::feedback::{FeedbackRow, Source};
 use gaitwright_store::measurement_files::MeasurementKind;
-use gaitwright_store::studies::AnswerSource;
+use gaitwright_store::studies::{AnswerSource, SimulatedWalks, SimulatedWalksEffect};
 use std::fmt::Display;
 
 /// A figure with four decimals, or a dash.
@@ -100,6 +100,18 @@ pub(crate) fn answer_source(source: AnswerSource) -> &'static str {
         AnswerSource::People => "people",
         AnswerSource::Both => "both Gait RMSE and people",
     }
+}
+
+/// What simulated walks do in a study; `None` if nothing.
+pub(crate) fn simulated_walks(walks: &SimulatedWalks) -> Option<String> {
+    let SimulatedWalks { effect, number, gait_rmse_tolerance_rad, least_mean_strides } = walks;
+    let what = match effect {
+        SimulatedWalksEffect::None => return None,
+        SimulatedWalksEffect::Report => "report".to_owned(),
+        SimulatedWalksEffect::TieBreak => format!("break ties of Gait RMSE within {gait_rmse_tolerance_rad} rad"),
+        SimulatedWalksEffect::Label => format!("label gaits with fewer than {least_mean_strides} strides"),
+    };
+    Some(format!("simulated walks ({number} on each ground): {what}"))
 }
 
 /// What a study waits for besides its solves; empty if it waits for solves only.

@@ -17,7 +17,7 @@ use gait_optimizer::settings::Naturalness;
 use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::study_plan::LARGEST_SEED;
+use gaitwright_service::studies::seed::LARGEST_SEED;
 use gaitwright_store::trial_list::SORTS;
 use serde_json::{Map, Value, json};
 

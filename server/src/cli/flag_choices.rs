@@ -40,6 +40,14 @@ pub(super) const WARM_STARTS: [FlagChoice; 2] = [
     ),
 ];
 
+/// What simulated walks can do in a study.
+pub(super) const SIMULATED_WALKS: [FlagChoice; 4] = [
+    ("none", "Nothing: no walks are simulated"),
+    ("report", "Each gait gets an execution report, which changes no trial"),
+    ("tie_break", "Two gaits with nearly the same Gait RMSE are compared by their mean strides"),
+    ("label", "A gait that walks too few strides is not executable, and is never recommended"),
+];
+
 /// Reads one of these names as the REST interface reads it.
 pub(super) fn one_of<T>(choices: impl IntoIterator<Item = FlagChoice>) -> impl TypedValueParser<Value = T>
 where
@@ -54,7 +62,7 @@ mod tests {
     use super::*;
     use gaitwright_service::studies::lab::MeasurementFormat;
     use gaitwright_service::studies::reference_import::{JointAngleFormat, Strikes, Unit};
-    use gaitwright_store::studies::WarmStartFrom;
+    use gaitwright_store::studies::{SimulatedWalksEffect, WarmStartFrom};
 
     fn all_are_known<T: DeserializeOwned>(choices: &[FlagChoice]) {
         for (name, _) in choices {
@@ -69,5 +77,7 @@ mod tests {
         all_are_known::<Strikes>(&HEEL_STRIKES);
         all_are_known::<MeasurementFormat>(&EMG_FORMATS);
         all_are_known::<WarmStartFrom>(&WARM_STARTS);
+        all_are_known::<SimulatedWalksEffect>(&SIMULATED_WALKS);
+        assert_eq!(SIMULATED_WALKS.map(|(name, _)| name), SimulatedWalksEffect::ALL.map(SimulatedWalksEffect::as_str));
     }
 }

@@ -1,6 +1,6 @@
 //! Parsers of numbers on the command line. Errors name the allowed range.
 
-use gaitwright_service::studies::study_plan::LARGEST_SEED;
+use gaitwright_service::studies::seed::LARGEST_SEED;
 use std::fmt::Display;
 use std::str::FromStr;
 

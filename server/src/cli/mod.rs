@@ -36,6 +36,7 @@ mod serve;
 mod service_plan;
 mod settings;
 mod simulate;
+mod simulated_walks_flags;
 mod solve;
 mod solve_file;
 mod subject_flags;

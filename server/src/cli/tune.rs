@@ -9,19 +9,21 @@ use super::output::{data, tell};
 use super::problem_files::ProblemFiles;
 use super::resumed_study;
 use super::settings::{AnchoredFlags, Settings};
+use super::simulated_walks_flags::SimulatedWalksFlags;
 use super::subject_flags::{SubjectFlags, Switch};
-use super::unattended_study::{self, Lines, action_line};
+use super::unattended_study::{self, Lines, Run, action_line};
 use clap::Args;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::certified_best::CertificateState;
+use gaitwright_service::studies::certified_best::{BestCertification, CertificateState};
+use gaitwright_service::studies::execution;
 use gaitwright_service::studies::recommended_trial::best_trial;
 use gaitwright_service::studies::study_plan::NewStudy;
-use gaitwright_service::studies::summary::{self, Summary};
+use gaitwright_service::studies::summary::{self, SimulatedWalksSummary, Summary};
 use gaitwright_service::studies::{built_in_entries, device, reference_import};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::commit;
 use gaitwright_store::studies::WarmStartFrom;
+use gaitwright_store::{Store, commit};
 use std::sync::Arc;
 
 #[derive(Debug, Args)]
@@ -51,6 +53,8 @@ pub(super) struct TuneCommand {
     /// The gait from which trials are warm-started (default: incumbent).
     #[arg(long, default_value = "incumbent", hide_default_value = true, value_parser = one_of::<WarmStartFrom>(WARM_STARTS))]
     warm_start_from: WarmStartFrom,
+    #[command(flatten)]
+    simulated_walks: SimulatedWalksFlags,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
     /// Print one JSON object at the end, and the line of each trial to stderr.
@@ -83,17 +87,19 @@ impl TuneCommand {
             seed: self.seed,
             repeat_results: Some(self.repeat_results),
             warm_start_from: self.warm_start_from,
+            simulated_walks: self.simulated_walks.setting(),
             ..NewStudy::of(subject.id)
         };
         let study = Box::pin(resumed_study::resumed_or_new(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
         let ran = Box::pin(unattended_study::run_and_certify(&mut store, &study, workers, lines)).await;
+        let found = match ran {
+            Ok((ran, certification)) => Box::pin(findings(&mut store, ran, certification)).await,
+            Err(error) => Err(error),
+        };
         store.close().await;
-        let (ran, certification) = ran?;
-        let (snapshot, analyses) = (ran.snapshot.clone(), Arc::clone(&ran.analyses));
-        let choose = move |pool: &OnPool| best_trial(&snapshot, &*analyses.posterior(pool, &snapshot)?);
-        let best = store.compute(choose).await?.map_err(Error::Learner)?;
-        self.print(&summary::of(&ran.snapshot, best, certification))?;
+        let (ran, summary) = found?;
+        self.print(&summary)?;
         if !self.json {
             tell(&format!("to view the study: gaitwright serve --database {}", settings.database().display()));
         }
@@ -127,6 +133,9 @@ impl TuneCommand {
                 if let Some(cost) = summary.best_cost_of_transport {
                     data(&format!("  cost of transport {cost:.4}"))?;
                 }
+                if let Some(walks) = &summary.best_simulated_walks {
+                    data(&format!("  simulated walks   {}", walks_line(walks)))?;
+                }
                 certificate_lines(summary).iter().try_for_each(|line| data(line))?;
             }
             _ => data("no trial found a gait")?,
@@ -136,6 +145,24 @@ impl TuneCommand {
         }
         Ok(())
     }
+}
+
+/// The summary of a study after its run.
+async fn findings(store: &mut Store, ran: Run, certification: BestCertification) -> Result<(Run, Summary), Error> {
+    let (snapshot, analyses) = (ran.snapshot.clone(), Arc::clone(&ran.analyses));
+    let choose = move |pool: &OnPool| best_trial(&snapshot, &*analyses.posterior(pool, &snapshot)?);
+    let best = store.compute(choose).await?.map_err(Error::Learner)?;
+    let report = match best {
+        Some(best) => execution::newest(&mut *store.read().await?, best).await?,
+        None => None,
+    };
+    let summary = summary::of(&ran.snapshot, best, certification, report.map(|kept| kept.reported.report).as_ref());
+    Ok((ran, summary))
+}
+
+fn walks_line(walks: &SimulatedWalksSummary) -> String {
+    let SimulatedWalksSummary { completed, simulated_walks, mean_strides, .. } = walks;
+    format!("{completed} of {simulated_walks} complete, {mean_strides:.2} strides on average")
 }
 
 /// The certificate of the best gait, and the alternative if it failed.

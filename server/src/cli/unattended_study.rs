@@ -6,6 +6,7 @@ use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::certified_best::{self, BestCertification};
+use gaitwright_service::studies::requested_reports;
 use gaitwright_service::studies::scheduler::Scheduler;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::summary;
@@ -70,11 +71,18 @@ pub(super) async fn run_and_certify(
     lines: Lines,
 ) -> Result<(Run, BestCertification), Error> {
     let ran = run(store, study, workers, lines).await?;
-    let certification = if ran.interrupted {
-        BestCertification::default()
-    } else {
-        certified(store, &ran.snapshot, &ran.analyses).await?
-    };
+    if ran.interrupted {
+        return Ok((ran, BestCertification::default()));
+    }
+    let certification = certified(store, &ran.snapshot, &ran.analyses).await?;
+    // The requests stay on record, so a service makes the reports that this command does not.
+    let requested = requested_reports::carry_out(store, study.id, workers, |number| {
+        tell(&format!("simulating walks with the gait of trial {number}"));
+    });
+    tokio::select! {
+        done = requested => done?,
+        () = interrupted() => {}
+    }
     Ok((ran, certification))
 }
 
@@ -148,6 +156,9 @@ fn trial_line(trial: &Trial, all: &[Trial]) -> String {
 fn describe(line: &mut String, trial: &Trial, all: &[Trial]) -> std::fmt::Result {
     if let (Some(rmse), Some(cost)) = (trial.gait_rmse_rad, trial.cost_of_transport) {
         write!(line, "  RMSE {rmse:.4} rad  cost {cost:.4}")?;
+    }
+    if let Some(strides) = trial.mean_strides {
+        write!(line, "  {strides:>5.2} strides")?;
     }
     if let (Some(iterations), Some(seconds)) = (trial.iterations, trial.seconds_total) {
         write!(line, "  {iterations:>4} iterations {seconds:>6.1} s")?;

@@ -74,9 +74,9 @@ pub struct ListedTrial {
     pub from: Option<(TrialId, u32)>,
     /// State of the trial.
     pub state: TrialState,
-    /// Gait RMSE, rad, of a converged gait.
+    /// Gait RMSE, rad, of a gait.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport of a converged gait.
+    /// Cost of transport of a gait.
     pub cost_of_transport: Option<f64>,
     /// Interior-point iterations.
     pub iterations: Option<u32>,
@@ -104,8 +104,8 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
          t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
          count(*) over () as matching, \
          case ?2 when 'number' then t.number when 'state' then t.state \
-             when 'gait_rmse_rad' then iif(t.state = 'converged', t.gait_rmse_rad, null) \
-             when 'cost_of_transport' then iif(t.state = 'converged', t.cost_of_transport, null) \
+             when 'gait_rmse_rad' then iif(t.state in ('converged', 'not_executable'), t.gait_rmse_rad, null) \
+             when 'cost_of_transport' then iif(t.state in ('converged', 'not_executable'), t.cost_of_transport, null) \
              when 'iterations' then t.iterations \
              when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
          from trials t \

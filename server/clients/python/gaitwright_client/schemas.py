@@ -87,8 +87,10 @@ LabSessionId = str
 # session accepts no more data.
 LabSessionState = Literal["planned", "under_way", "closed"]
 
-# Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
-Label = Literal["converged", "not_converged"]
+# Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too;
+# `not_executable`, it found a gait whose simulated walks are too short for the study, which is a result like
+# `not_converged`.
+Label = Literal["converged", "not_converged", "not_executable"]
 
 # A leg: `left` (intact) or `right` (prosthesis).
 Leg = Literal["left", "right"]
@@ -121,6 +123,9 @@ PairAnswer = Literal["a", "b", "no_difference"]
 # Identifier of a reference gait.
 ReferenceGaitId = str
 
+# Label that a script reports: `converged`, the evaluation found a gait; `not_converged`, it found none.
+ReportedLabel = Literal["converged", "not_converged"]
+
 # A right of a user or a token: `read`, see everything except blinded data; `run`, create, start, pause and stop
 # studies, plan lab sessions, and evaluate trials by scripts; `answer`, give preferences without blinding, and review
 # safety reports; `rate`, compare gaits blind, and record walks and answers in lab sessions; `device`, fetch the
@@ -146,6 +151,11 @@ SessionId = str
 
 # How a user signed in.
 SignInMethod = Literal["link", "password"]
+
+# What the simulated walks with a new gait do in a study: `none`, the service simulates none by itself; `report`, each
+# gait gets an execution report; `tie_break`, the report also decides between two gaits with nearly the same Gait RMSE;
+# `label`, a gait that walks too few strides gets the label `not_executable`.
+SimulatedWalksEffect = Literal["none", "report", "tie_break", "label"]
 
 # How a solve ended: `converged`, every constraint is satisfied; `infeasible`, at a local minimum of the violation, with
 # no gait near it; `stalled`, without further progress; `iteration_limit` and `time_limit`, at that limit; `cancelled`,
@@ -182,9 +192,10 @@ TokenId = str
 # Identifier of a trial.
 TrialId = str
 
-# State of a trial. `queued` and `running` trials are open. `converged` and `not_converged` are results; `failed`
-# (error, crash or time limit), `lost` (the worker stopped responding) and `cancelled` are not.
-TrialState = Literal["queued", "running", "converged", "not_converged", "failed", "lost", "cancelled"]
+# State of a trial. `queued` and `running` trials are open. `converged`, `not_converged` and `not_executable` (a gait
+# whose simulated walks are too short for the study) are results; `failed` (error, crash or time limit), `lost` (the
+# worker stopped responding) and `cancelled` are not.
+TrialState = Literal["queued", "running", "converged", "not_converged", "not_executable", "failed", "lost", "cancelled"]
 
 # Unit of angles.
 Unit = Literal["degrees", "radians"]
@@ -2238,6 +2249,8 @@ class NewStudy(_NewStudyRequired, total=False):
     search_space: Optional[SearchSpace]
     # Seed for all random draws except allocations.
     seed: int
+    # Simulated walks with each gait. They do nothing by default.
+    simulated_walks: SimulatedWalks
     # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
     # Total solve time, s, after which no new trial starts.
@@ -2497,6 +2510,8 @@ class Recommended(TypedDict):
     cost_of_transport: Optional[float]
     # Gait RMSE of the trial, rad. Null if the script that evaluated the trial did not report it.
     gait_rmse_rad: Optional[float]
+    # Mean strides of the simulated walks on which the result of the trial depends. Null if it depends on none.
+    mean_strides: Optional[float]
     # Number of the trial.
     number: int
     # Trial of the action.
@@ -2521,7 +2536,7 @@ class _RecommendationRequired(Recommended):
 class Recommendation(_RecommendationRequired, total=False):
     """Best action of a study."""
 
-    # The newest execution report of its gait. Null if nobody requested one.
+    # The newest execution report of its gait. Null if there is none.
     execution_report: Optional[ExecutionReport]
     # If the certificate failed, the best action whose gait passed. Null if there is none.
     passing: Optional[Recommended]
@@ -2806,6 +2821,21 @@ class SignInLink(TypedDict):
     path: str
 
 
+class SimulatedWalks(TypedDict, total=False):
+    """Simulated walks with the gaits of a study. Their seed is that of the study, so that all gaits meet the same
+    disturbances.
+    """
+
+    # What they do.
+    effect: SimulatedWalksEffect
+    # `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
+    gait_rmse_tolerance_rad: float
+    # `label`: the least mean number of strides of an executable gait. A complete walk has 20 strides. 0 to 20.
+    least_mean_strides: float
+    # Number of simulated walks on each of the three kinds of ground, 1 to 1000.
+    number: int
+
+
 class SimulatedWalksOnGround(TypedDict):
     """Simulated walks on one kind of ground."""
 
@@ -3041,6 +3071,8 @@ class StudyPlan(TypedDict):
     search_space: SearchSpace
     # Seed for all random draws except allocations.
     seed: int
+    # Simulated walks with each gait.
+    simulated_walks: SimulatedWalks
     # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
     # Total solve time, s, after which no new trial starts.
@@ -3222,7 +3254,7 @@ class SurvivedPushes(TypedDict):
 
 class _TellRequestRequired(TypedDict):
     # Whether the evaluation found a gait.
-    label: Label
+    label: ReportedLabel
 
 
 class TellRequest(_TellRequestRequired, total=False):
@@ -3255,15 +3287,15 @@ class Trial(TypedDict):
     action_index: int
     # Best trial when this one was proposed. Null if there was none.
     best_before: Optional[TrialId]
-    # Cost of transport of a converged gait, dimensionless. Null if the trial has no converged gait, or if the script
-    # that evaluated it did not report the value.
+    # Cost of transport of the gait, dimensionless. Null if the trial has no gait, or if the script that evaluated it
+    # did not report the value.
     cost_of_transport: Optional[float]
     # Time of proposal.
     created_at: Instant
     # Time at which it ended. Null while it is open.
     finished_at: Optional[Instant]
-    # Gait RMSE of a converged gait, rad. Null if the trial has no converged gait, or if the script that evaluated it
-    # did not report the value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
+    # Gait RMSE of the gait, rad. Null if the trial has no gait, or if the script that evaluated it did not report the
+    # value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Optional[float]
     # Identifier.
     id: TrialId
@@ -3271,6 +3303,9 @@ class Trial(TypedDict):
     iterations: Optional[int]
     # Largest violation, scaled. Null without a completed solve.
     max_violation: Optional[float]
+    # Mean strides of the simulated walks on which the result of the trial depends. Null if the trial has no gait, or if
+    # the study compares and labels no gait by simulated walks.
+    mean_strides: Optional[float]
     # Human-readable message about how the trial ended; may be empty.
     message: str
     # Number within the study, from 1, in the order of proposal.
@@ -3306,6 +3341,8 @@ class TrialCounts(TypedDict):
     converged: int
     # Trials that did not converge.
     not_converged: int
+    # Trials with a gait that is not executable.
+    not_executable: int
     # Queued or running trials.
     open: int
     # All trials.

@@ -45,7 +45,7 @@ pub(super) struct Recommendation {
     passing: Option<Recommended>,
     /// Tuned bounds that were active in no gait of the study so far.
     never_active: Vec<String>,
-    /// The newest execution report of its gait. Null if nobody requested one.
+    /// The newest execution report of its gait. Null if there is none.
     execution_report: Option<ExecutionReport>,
     /// Whether gaits of the study are being certified. If so, the recommendation may change.
     certifying: bool,
@@ -65,6 +65,8 @@ struct Recommended {
     gait_rmse_rad: Option<f64>,
     /// Cost of transport of the trial. Null if the script that evaluated the trial did not report it.
     cost_of_transport: Option<f64>,
+    /// Mean strides of the simulated walks on which the result of the trial depends. Null if it depends on none.
+    mean_strides: Option<f64>,
 }
 
 impl Recommended {
@@ -75,6 +77,7 @@ impl Recommended {
             bounds: trial.action,
             gait_rmse_rad: trial.gait_rmse_rad,
             cost_of_transport: trial.cost_of_transport,
+            mean_strides: trial.mean_strides,
         }
     }
 }

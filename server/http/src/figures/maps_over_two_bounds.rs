@@ -118,7 +118,7 @@ pub(crate) fn maps(
 /// The text below each map.
 pub(crate) const MAP_NOTES: [&str; 2] = [
     "Mean ± standard deviation. Lines connect equal means. The frame marks the best action.",
-    "Lines connect equal probabilities. The small numbers count the trials with these two values: yes means converged, no means not converged.",
+    "Lines connect equal probabilities. The small numbers count the trials with these two values: yes means converged, no means not converged or not executable.",
 ];
 
 /// How many trials with these levels converged and how many did not.
@@ -128,7 +128,8 @@ fn tried(snapshot: &StudySnapshot, space: &SearchSpace, levels: [(usize, usize);
         levels.iter().all(|(dimension, level)| own[*dimension] == *level)
     };
     let count = |state| snapshot.trials.iter().filter(here).filter(|trial| trial.state == state).count();
-    match (count(TrialState::Converged), count(TrialState::NotConverged)) {
+    let without_gait = count(TrialState::NotConverged) + count(TrialState::NotExecutable);
+    match (count(TrialState::Converged), without_gait) {
         (0, 0) => String::new(),
         (converged, not) => format!("{converged} yes, {not} no"),
     }

@@ -29,7 +29,7 @@ use gaitwright_service::studies::reported_gait::ReportedGait;
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::sensitivities;
 use gaitwright_store::studies::Study;
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::Trial;
 use gaitwright_store::{TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 use serde::Deserialize;
 
@@ -40,6 +40,8 @@ struct GaitPage {
     state: String,
     rmse: String,
     cost: String,
+    /// Mean strides of the simulated walks on which the result depends.
+    strides: Option<String>,
     seconds: String,
     violation: String,
     values: Vec<(&'static str, String)>,
@@ -132,14 +134,14 @@ pub(super) async fn get(
         reports.retain(|report| report.trial == id);
     }
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
-    let converged = trial.state == TrialState::Converged;
-    let walks = if converged {
+    let with_gait = trial.state.has_gait();
+    let walks = if with_gait {
         Some(SimulatedWalks::new(app.scheduler.simulating(id), execution::newest(&mut reader, id).await?))
     } else {
         None
     };
     let solution =
-        if converged && shown.sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
+        if with_gait && shown.sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
     let last_event = events::last(&mut reader, study.id).await?;
     let effort = app.scheduler.explaining(id);
     let explained = explanation::state(&mut reader, &trial, effort.clone()).await?;
@@ -159,7 +161,7 @@ pub(super) async fn get(
         let gait = gait.map(|(gait, iterations)| Ok::<_, Error>((gait.unpack(pool)?, iterations.unpack(pool)?)));
         let (gait, iterations) = gait.transpose()?.unzip();
         // Charts show what they can of a malformed gait; values of it would be false.
-        let well_formed = gait.as_ref().filter(|gait| converged && gait.validate().is_ok());
+        let well_formed = gait.as_ref().filter(|gait| with_gait && gait.validate().is_ok());
         let summary = well_formed.map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
         let sensitivities = solution.map(|solution| SensitivityTable::new(solution, pool));
         let drawn = draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?;
@@ -170,6 +172,7 @@ pub(super) async fn get(
         state: words(trial.state.as_str()),
         rmse: format::decimal(trial.gait_rmse_rad),
         cost: format::decimal(trial.cost_of_transport),
+        strides: trial.mean_strides.map(|strides| format!("{strides:.2}")),
         seconds: format::seconds(trial.seconds_total),
         violation: format::optional_number(trial.max_violation),
         values: values(&trial),
@@ -183,7 +186,7 @@ pub(super) async fn get(
         certificate,
         certification: CertificateJob::of(app.scheduler.certifying(id)),
         walks,
-        offers_sensitivities: converged && sensitivities.is_none(),
+        offers_sensitivities: with_gait && sensitivities.is_none(),
         sensitivities,
         groups: drawn.groups,
         solve: drawn.solve,

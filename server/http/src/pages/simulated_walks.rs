@@ -13,7 +13,7 @@ use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{MOST_SIMULATED_WALKS, NewExecutionReport, Simulation};
 use gaitwright_service::studies::execution_request;
-use gaitwright_service::studies::study_plan::LARGEST_SEED;
+use gaitwright_service::studies::seed::LARGEST_SEED;
 use gaitwright_store::execution_reports::{ExecutionReported, StoredReport};
 use gaitwright_store::{Instant, TrialId, commit};
 use serde::Deserialize;

@@ -136,6 +136,10 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
         ("Variant".to_owned(), format::variant(plan.muscles).to_owned()),
         ("Device".to_owned(), study.device.clone()),
         ("Source of answers".to_owned(), format::answer_source(plan.answer_source).to_owned()),
+        (
+            "Simulated walks".to_owned(),
+            format::simulated_walks(&plan.simulated_walks).unwrap_or_else(|| "only on request".to_owned()),
+        ),
         ("Combinations of bounds".to_owned(), format::count(plan.search_space.len())),
         ("Seed".to_owned(), plan.seed.to_string()),
         ("Trials with a result".to_owned(), format!("{} of {}", study.counts.results(), plan.number_of_trials)),

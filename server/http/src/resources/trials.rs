@@ -36,12 +36,15 @@ pub(crate) struct Trial {
     state: TrialState,
     /// How the solve ended. Null without a completed solve.
     status: Option<SolveStatus>,
-    /// Gait RMSE of a converged gait, rad. Null if the trial has no converged gait, or if the script
+    /// Gait RMSE of the gait, rad. Null if the trial has no gait, or if the script
     /// that evaluated it did not report the value. If the trial did not converge, `report` has the Gait RMSE of the last iterate.
     gait_rmse_rad: Option<f64>,
-    /// Cost of transport of a converged gait, dimensionless. Null if the trial has no converged gait, or if the
+    /// Cost of transport of the gait, dimensionless. Null if the trial has no gait, or if the
     /// script that evaluated it did not report the value.
     cost_of_transport: Option<f64>,
+    /// Mean strides of the simulated walks on which the result of the trial depends. Null if the trial has no gait, or if
+    /// the study compares and labels no gait by simulated walks.
+    mean_strides: Option<f64>,
     /// Objective of the solve. Null without a completed solve.
     objective: Option<f64>,
     /// Largest violation, scaled. Null without a completed solve.
@@ -80,6 +83,7 @@ impl From<trials::Trial> for Trial {
             status,
             gait_rmse_rad,
             cost_of_transport,
+            mean_strides,
             objective,
             max_violation,
             iterations,
@@ -105,6 +109,7 @@ impl From<trials::Trial> for Trial {
             status: status.map(Into::into),
             gait_rmse_rad,
             cost_of_transport,
+            mean_strides,
             objective,
             max_violation,
             iterations,
@@ -130,14 +135,16 @@ pub(crate) struct TrialCounts {
     converged: u32,
     /// Trials that did not converge.
     not_converged: u32,
+    /// Trials with a gait that is not executable.
+    not_executable: u32,
     /// Failed, lost or cancelled trials.
     without_result: u32,
 }
 
 impl From<trials::TrialCounts> for TrialCounts {
     fn from(counts: trials::TrialCounts) -> Self {
-        let trials::TrialCounts { total, open, converged, not_converged, without_result } = counts;
-        Self { total, open, converged, not_converged, without_result }
+        let trials::TrialCounts { total, open, converged, not_converged, not_executable, without_result } = counts;
+        Self { total, open, converged, not_converged, not_executable, without_result }
     }
 }
 

@@ -4,7 +4,7 @@
 use super::snapshot::StudySnapshot;
 use gait_learner::{ActionIndex, Dimension, ExcludedActions, LearnerError, SearchSpace};
 use gait_optimizer::{TunedBounds, UnchangedBound};
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::Trial;
 use std::ops::Range;
 
 /// The actions of the search space that have the gait of a trial, each trial's own action included.
@@ -14,7 +14,7 @@ use std::ops::Range;
 pub(super) fn actions_with_known_gait(snapshot: &StudySnapshot) -> Result<ExcludedActions, LearnerError> {
     let space = &snapshot.study.plan.search_space;
     let mut boxes = Vec::new();
-    for trial in converged(snapshot) {
+    for trial in with_gait(snapshot) {
         let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);
         boxes.push(levels_with_gait(space, space.check(trial.action_index)?, unchanged));
     }
@@ -36,7 +36,7 @@ pub(super) fn levels_with_gait(
 
 /// The tuned bounds that were active in no gait of the study. Empty if there are fewer than two gaits, or if one does not say.
 pub fn never_active(snapshot: &StudySnapshot) -> Vec<String> {
-    let gaits: Vec<&Trial> = converged(snapshot).collect();
+    let gaits: Vec<&Trial> = with_gait(snapshot).collect();
     let is_inactive = |trial: &Trial, name: &str| {
         let mut bounds = trial.report.iter().flat_map(|report| &report.unchanged_bounds);
         let value = TunedBounds::place_of(name).map(|place| trial.action.to_array()[place]);
@@ -49,8 +49,8 @@ pub fn never_active(snapshot: &StudySnapshot) -> Vec<String> {
         .collect()
 }
 
-fn converged(snapshot: &StudySnapshot) -> impl Iterator<Item = &Trial> {
-    snapshot.trials.iter().filter(|trial| trial.state == TrialState::Converged)
+fn with_gait(snapshot: &StudySnapshot) -> impl Iterator<Item = &Trial> {
+    snapshot.trials.iter().filter(|trial| trial.state.has_gait())
 }
 
 /// The levels around `own` with which the gait stays a solution.

@@ -26,7 +26,7 @@ pub(super) async fn end(writer: &mut Writer, trial: TrialId, reason: &str) -> Re
     let state =
         trial_transitions::after(row.state, TrialEvent::Cancelled).map_err(|e| Error::conflict(e.to_string()))?;
     solve_jobs::cancel(writer, trial).await?;
-    let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
+    let end = TrialEnd { state, report: None, mean_strides: None, violations: Vec::new(), message: reason.to_owned() };
     trials::finish(writer, trial, &end).await?;
     let payload = json!({ "trial_id": trial, "number": row.number, "state": state });
     Ok(events::append(writer, row.study_id, "trial_ended", &payload).await?)

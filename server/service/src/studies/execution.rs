@@ -1,6 +1,6 @@
 //! The execution report of one trial's gait: what it is of, its state, and its storage.
 
-use super::study_plan::LARGEST_SEED;
+use super::seed::LARGEST_SEED;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
@@ -8,8 +8,10 @@ use gait_optimizer::execution::{ExecutionOptions, ExecutionReport};
 use gaitwright_store::audit::{self, Actor};
 pub use gaitwright_store::execution_reports::newest;
 use gaitwright_store::execution_reports::{self, ExecutionReported};
-use gaitwright_store::trials::{Trial, TrialState};
-use gaitwright_store::{Connection, Packed, Store, TrialId, commit, consents, events, gaits, trials};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{
+    Connection, Packed, Store, StoreResult, TrialId, Writer, commit, consents, events, gaits, trials,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -102,7 +104,7 @@ pub(super) async fn gait_of(db: &mut Connection, id: TrialId) -> Result<Packed<G
 /// Why no walk with the gait of a trial can be simulated.
 fn why_not(trial: &Trial) -> Option<String> {
     let number = trial.number;
-    if trial.state != TrialState::Converged {
+    if !trial.state.has_gait() {
         let state = has_state(trial.state);
         return Some(format!("Trial {number} {state}. Walks can be simulated only with a converged gait."));
     }
@@ -112,7 +114,7 @@ fn why_not(trial: &Trial) -> Option<String> {
     trial.script.is_some().then_some(by_script)
 }
 
-/// Stores a report.
+/// Stores a requested report.
 ///
 /// # Errors
 /// [`Error::Conflict`] if the subject withdrew consent; errors of the database.
@@ -125,11 +127,37 @@ pub(super) async fn record(
     let mut writer = store.write().await?;
     let trial = trials::get(&mut writer, id).await?;
     consents::may_be_shown(&mut writer, trial.study_id).await?;
-    let NewExecutionReport { simulated_walks, seed } = asked;
+    write(&mut writer, &trial, asked, report).await?;
+    Ok(commit(writer).await?)
+}
+
+/// Writes a report, within the change of the caller.
+///
+/// # Errors
+/// Errors of the database.
+pub(super) async fn write(
+    writer: &mut Writer,
+    trial: &Trial,
+    asked: NewExecutionReport,
+    report: ExecutionReport,
+) -> StoreResult<()> {
+    let (id, NewExecutionReport { simulated_walks, seed }) = (trial.id, asked);
     let actor = Actor::program();
     let program = actor.as_str().to_owned();
     let reported = ExecutionReported { trial_id: id, number: trial.number, simulated_walks, seed, program, report };
-    events::append(&mut writer, trial.study_id, execution_reports::REPORTED, &reported).await?;
-    audit::append(&mut writer, &actor, execution_reports::STORED, &format!("trial {id}"), &json!(asked)).await?;
-    Ok(commit(writer).await?)
+    events::append(writer, trial.study_id, execution_reports::REPORTED, &reported).await?;
+    audit::append(writer, &actor, execution_reports::STORED, &format!("trial {id}"), &json!(asked)).await
+}
+
+/// Records a request, so that it outlives the process.
+///
+/// # Errors
+/// Errors of the database.
+pub(super) async fn request(
+    writer: &mut Writer,
+    actor: &Actor,
+    id: TrialId,
+    asked: NewExecutionReport,
+) -> StoreResult<()> {
+    audit::append(writer, actor, execution_reports::REQUESTED, &format!("trial {id}"), &json!(asked)).await
 }

@@ -1,12 +1,11 @@
 //! Requests for the execution report of one trial's gait.
 
-use super::execution::{NewExecutionReport, gait_of, newest};
+use super::execution::{NewExecutionReport, gait_of, newest, request};
 use super::scheduler::Scheduler;
 use crate::error::Error;
-use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::execution_reports::{self, StoredReport};
+use gaitwright_store::audit::Actor;
+use gaitwright_store::execution_reports::StoredReport;
 use gaitwright_store::{TrialId, Writer, consents, trials};
-use serde_json::json;
 
 /// Requests the report of a trial's gait, unless its newest one has the same number and seed.
 ///
@@ -36,7 +35,7 @@ pub async fn ask(
     if !exists {
         gait_of(writer, id).await?;
         if open.is_none() {
-            audit::append(writer, actor, execution_reports::REQUESTED, &format!("trial {id}"), &json!(asked)).await?;
+            request(writer, actor, id, asked).await?;
         }
     }
     if scheduler.simulate(id, (!exists).then_some(asked)) {

@@ -7,6 +7,7 @@ use super::trial_jobs::{TrialJob, run_cancellable};
 use crate::error::Error;
 use crate::workers::Explain;
 use gait_optimizer::CancelToken;
+use gaitwright_compute::priority::AFTERWARDS;
 use gaitwright_store::accessible_studies::Reach;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, cancelled_jobs, commit, events, explanations, trials};
 use serde_json::json;
@@ -93,7 +94,7 @@ impl TrialJob for Explainer {
         let (solve, problem) = store.compute(move |pool| packed.unpack(pool)).await??;
         let explain = Arc::clone(&self.explain);
         let work = move |cancel: &CancelToken| explain.explain(&solve, cancel);
-        let Some(found) = run_cancellable("explainer", &cancelled, work).await?? else {
+        let Some(found) = run_cancellable(("explainer", AFTERWARDS), &cancelled, work).await?? else {
             let nothing = || Error::Internal("the explanation ended without a result".to_owned());
             return if cancelled.is_cancelled() { Ok(()) } else { Err(nothing()) };
         };

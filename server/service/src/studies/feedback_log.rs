@@ -1,6 +1,7 @@
 //! The only writer of the learner's log: every answer of pages, REST, raters, lab sessions, suggestions and Gait RMSE
 //! ends here. A test fails if another module writes the table.
 
+use super::gait_rmse_answers::ComputedAnswer;
 use super::identical_gaits::is_same_gait;
 use super::trial_transitions::has_state;
 use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
@@ -249,14 +250,14 @@ pub(super) async fn compute(
     writer: &mut Writer,
     study: StudyId,
     (trial, label): (TrialId, Label),
-    answers: &[FeedbackContent],
+    answers: &[ComputedAnswer],
     author: &str,
 ) -> Result<(), Error> {
-    let attribution = |source| Attribution { source, author, note: "" };
+    let attribution = |source, note| Attribution { source, author, note };
     let label = FeedbackContent::Label { trial, label };
-    feedback::append(writer, study, &label, attribution(Source::Evaluation), Origin::New).await?;
-    for answer in answers {
-        feedback::append(writer, study, answer, attribution(Source::GaitRmse), Origin::New).await?;
+    feedback::append(writer, study, &label, attribution(Source::Evaluation, ""), Origin::New).await?;
+    for ComputedAnswer { content, note } in answers {
+        feedback::append(writer, study, content, attribution(Source::GaitRmse, note.as_str()), Origin::New).await?;
     }
     Ok(())
 }

@@ -6,7 +6,38 @@ use gait_learner::{LearnerError, proposed_comparisons_among};
 use gaitwright_compute::OnPool;
 use gaitwright_store::TrialId;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::AnswerSource;
+use gaitwright_store::studies::{AnswerSource, SimulatedWalks, SimulatedWalksEffect};
+use gaitwright_store::trials::Trial;
+
+/// What decides a comparison about a gait.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ComparedGait {
+    trial: TrialId,
+    number: u32,
+    gait_rmse_rad: f64,
+    mean_strides: Option<f64>,
+}
+
+impl ComparedGait {
+    /// The gait of a trial; `None` without Gait RMSE.
+    pub(super) fn of(trial: &Trial) -> Option<Self> {
+        Some(Self {
+            trial: trial.id,
+            number: trial.number,
+            gait_rmse_rad: trial.gait_rmse_rad?,
+            mean_strides: trial.mean_strides,
+        })
+    }
+}
+
+/// A computed answer.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ComputedAnswer {
+    /// What it says.
+    pub(super) content: FeedbackContent,
+    /// Its reason; empty if Gait RMSE alone decided.
+    pub(super) note: String,
+}
 
 /// The preferences about a new converged trial; none if people answer. `snapshot` does not have the result of the new
 /// trial yet.
@@ -18,12 +49,16 @@ pub(super) fn gait_rmse_answers(
     snapshot: &StudySnapshot,
     new: TrialId,
     gait_rmse_rad: f64,
-) -> Result<Vec<FeedbackContent>, Error> {
-    if snapshot.study.plan.answer_source == AnswerSource::People {
+    mean_strides: Option<f64>,
+) -> Result<Vec<ComputedAnswer>, Error> {
+    let plan = &snapshot.study.plan;
+    if plan.answer_source == AnswerSource::People {
         return Ok(Vec::new());
     }
-    let partners = partners(pool, snapshot, new).map_err(Error::Learner)?;
-    let answer = |id| Some(by_gait_rmse((new, gait_rmse_rad), (id, snapshot.trial(id)?.gait_rmse_rad?)));
+    let Some(number) = snapshot.trial(new).map(|trial| trial.number) else { return Ok(Vec::new()) };
+    let new = ComparedGait { trial: new, number, gait_rmse_rad, mean_strides };
+    let partners = partners(pool, snapshot, new.trial).map_err(Error::Learner)?;
+    let answer = |id| Some(answer(&plan.simulated_walks, new, ComparedGait::of(snapshot.trial(id)?)?));
     Ok(partners.into_iter().filter_map(answer).collect())
 }
 
@@ -43,13 +78,98 @@ fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Vec<Tr
     Ok(proposed.into_iter().filter_map(|c| snapshot.trial_of(c.against)).map(|trial| trial.id).collect())
 }
 
-/// The preference that Gait RMSE implies: the smaller value is better, equal values mean no difference.
-pub(super) fn by_gait_rmse(new: (TrialId, f64), old: (TrialId, f64)) -> FeedbackContent {
-    if new.1 < old.1 {
-        FeedbackContent::Preference { winner: new.0, loser: old.0 }
-    } else if old.1 < new.1 {
-        FeedbackContent::Preference { winner: old.0, loser: new.0 }
+/// The computed answer about two gaits. The smaller Gait RMSE is better, equal values mean no difference. If simulated
+/// walks break ties and the values differ by less than the tolerance, the gait with more strides is better.
+pub(super) fn answer(walks: &SimulatedWalks, new: ComparedGait, old: ComparedGait) -> ComputedAnswer {
+    match by_mean_strides(walks, new, old) {
+        Some(answer) => answer,
+        None => ComputedAnswer { content: by_gait_rmse(new, old), note: String::new() },
+    }
+}
+
+fn by_gait_rmse(new: ComparedGait, old: ComparedGait) -> FeedbackContent {
+    if new.gait_rmse_rad < old.gait_rmse_rad {
+        FeedbackContent::Preference { winner: new.trial, loser: old.trial }
+    } else if old.gait_rmse_rad < new.gait_rmse_rad {
+        FeedbackContent::Preference { winner: old.trial, loser: new.trial }
     } else {
-        FeedbackContent::NoDifference { a: new.0, b: old.0 }
+        FeedbackContent::NoDifference { a: new.trial, b: old.trial }
+    }
+}
+
+/// `None` if Gait RMSE decides: simulated walks break no ties, there is no tie, or both gaits have the same mean strides.
+fn by_mean_strides(walks: &SimulatedWalks, new: ComparedGait, old: ComparedGait) -> Option<ComputedAnswer> {
+    let (of_new, of_old) = (new.mean_strides?, old.mean_strides?);
+    let difference = (new.gait_rmse_rad - old.gait_rmse_rad).abs();
+    let is_tie = walks.effect == SimulatedWalksEffect::TieBreak && difference < walks.gait_rmse_tolerance_rad;
+    if !is_tie || of_new == of_old {
+        return None;
+    }
+    let (winner, loser) = if of_new > of_old { (new, old) } else { (old, new) };
+    let note = format!(
+        "Gait RMSE differs by {difference:.4} rad, less than the tolerance of {} rad, so simulated walks decide: {:.2} strides \
+         on average with trial {}, {:.2} with trial {}.",
+        walks.gait_rmse_tolerance_rad,
+        of_new.max(of_old),
+        winner.number,
+        of_new.min(of_old),
+        loser.number,
+    );
+    Some(ComputedAnswer { content: FeedbackContent::Preference { winner: winner.trial, loser: loser.trial }, note })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gait(number: u32, gait_rmse_rad: f64, mean_strides: Option<f64>) -> ComparedGait {
+        ComparedGait { trial: TrialId::fresh(), number, gait_rmse_rad, mean_strides }
+    }
+
+    /// Whether the new gait wins, and whether the answer names simulated walks.
+    fn decided(effect: SimulatedWalksEffect, new: ComparedGait, old: ComparedGait) -> (Option<bool>, bool) {
+        let walks = SimulatedWalks { effect, gait_rmse_tolerance_rad: 0.05, ..SimulatedWalks::default() };
+        let ComputedAnswer { content, note } = answer(&walks, new, old);
+        let new_wins = match content {
+            FeedbackContent::Preference { winner, .. } => Some(winner == new.trial),
+            _ => None,
+        };
+        (new_wins, note.contains("simulated walks decide"))
+    }
+
+    #[test]
+    fn gaits_within_the_tolerance_are_compared_by_their_strides() {
+        use SimulatedWalksEffect::{Label, None as Off, Report, TieBreak};
+        let worse_but_steady = gait(2, 0.64, Some(9.0));
+        let better_but_falls = gait(1, 0.60, Some(2.0));
+        assert_eq!(decided(TieBreak, worse_but_steady, better_but_falls), (Some(true), true));
+        assert_eq!(decided(TieBreak, better_but_falls, worse_but_steady), (Some(false), true));
+        for effect in [Off, Report, Label] {
+            assert_eq!(decided(effect, worse_but_steady, better_but_falls), (Some(false), false), "{effect:?}");
+        }
+    }
+
+    #[test]
+    fn gait_rmse_decides_outside_the_tolerance_and_where_strides_say_nothing() {
+        let better = gait(1, 0.60, Some(2.0));
+        for (other, new_wins) in [
+            (gait(2, 0.65, Some(9.0)), Some(false)),
+            (gait(2, 0.61, Some(2.0)), Some(false)),
+            (gait(2, 0.61, None), Some(false)),
+            (gait(2, 0.60, Some(2.0)), None),
+        ] {
+            assert_eq!(decided(SimulatedWalksEffect::TieBreak, other, better), (new_wins, false), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn reason_of_an_answer_names_both_gaits_and_the_tolerance() {
+        let walks = SimulatedWalks { effect: SimulatedWalksEffect::TieBreak, ..SimulatedWalks::default() };
+        let ComputedAnswer { note, .. } = answer(&walks, gait(7, 0.62, Some(4.25)), gait(3, 0.6, Some(2.0)));
+        assert_eq!(
+            note,
+            "Gait RMSE differs by 0.0200 rad, less than the tolerance of 0.05 rad, so simulated walks decide: 4.25 strides \
+             on average with trial 7, 2.00 with trial 3."
+        );
     }
 }

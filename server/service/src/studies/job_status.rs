@@ -75,7 +75,7 @@ fn solve(trial: &Trial) -> FoundState {
     Some(match trial.state {
         TrialState::Queued => (JobState::Queued, None),
         TrialState::Running => (JobState::Running, None),
-        TrialState::Converged | TrialState::NotConverged => (JobState::Done, None),
+        TrialState::Converged | TrialState::NotConverged | TrialState::NotExecutable => (JobState::Done, None),
         TrialState::Cancelled => (JobState::Cancelled, None),
         TrialState::Failed | TrialState::Lost => (JobState::Failed, Some(trial.message.clone())),
     })

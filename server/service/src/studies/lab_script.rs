@@ -5,7 +5,7 @@
 
 use super::analysis::Analyses;
 use super::feedback_log;
-use super::gait_rmse_answers::gait_rmse_answers;
+use super::gait_rmse_answers::{ComputedAnswer, gait_rmse_answers};
 use super::lifecycle;
 use super::safety_reports::SafetyReports;
 use super::snapshot::StudySnapshot;
@@ -15,7 +15,6 @@ use crate::error::Error;
 use crate::printable;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit;
-use gaitwright_store::feedback::FeedbackContent;
 use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyState};
 use gaitwright_store::trials::{Label, NewTrial, ReportedResult, Trial, TrialState};
 use gaitwright_store::{Connection, Store, StudyId, TrialId, Writer, events, studies, trials};
@@ -148,12 +147,31 @@ pub async fn assign(
     Ok(Some(trials::get(writer, id).await?))
 }
 
+/// Label that a script reports: `converged`, the evaluation found a gait; `not_converged`, it found none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReportedLabel {
+    /// The evaluation found a gait.
+    Converged,
+    /// The evaluation found no gait.
+    NotConverged,
+}
+
+impl From<ReportedLabel> for Label {
+    fn from(label: ReportedLabel) -> Self {
+        match label {
+            ReportedLabel::Converged => Self::Converged,
+            ReportedLabel::NotConverged => Self::NotConverged,
+        }
+    }
+}
+
 /// The result of a trial, as a script reports it.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TellRequest {
     /// Whether the evaluation found a gait.
-    pub label: Label,
+    pub label: ReportedLabel,
     /// Reason why no gait was found, 1 to 2000 characters. Required for `not_converged`.
     #[serde(default)]
     #[schema(max_length = 2000)]
@@ -172,7 +190,7 @@ pub struct TellRequest {
 pub struct CheckedResult {
     snapshot: StudySnapshot,
     result: ReportedResult,
-    answers: Vec<FeedbackContent>,
+    answers: Vec<ComputedAnswer>,
 }
 
 /// Checks a result and derives its preferences, outside any transaction.
@@ -199,7 +217,7 @@ pub async fn check_result(store: &mut Store, id: TrialId, tell: &TellRequest) ->
         return Ok(CheckedResult { snapshot, result, answers: Vec::new() });
     };
     let find = move |pool: &OnPool| {
-        let answers = gait_rmse_answers(pool, &snapshot, id, rmse);
+        let answers = gait_rmse_answers(pool, &snapshot, id, rmse, None);
         (snapshot, answers)
     };
     let (snapshot, answers) = store.compute(find).await?;
@@ -215,17 +233,17 @@ fn checked(study: &Study, tell: &TellRequest) -> Result<ReportedResult, Error> {
             return Err(Error::invalid(field, json!(value), "0 to 1e6"));
         }
     }
-    if tell.label == Label::NotConverged && reason.is_empty() {
+    if tell.label == ReportedLabel::NotConverged && reason.is_empty() {
         return Err(Error::invalid("reason", "", "1 to 2000 characters long and say why no gait was found"));
     }
-    let converged = tell.label == Label::Converged;
+    let converged = tell.label == ReportedLabel::Converged;
     let answered_by_rmse = study.plan.answer_source != AnswerSource::People;
     if converged && answered_by_rmse && tell.gait_rmse_rad.is_none() {
         let allowed = "a number, because Gait RMSE answers the comparisons of this study";
         return Err(Error::invalid("gait_rmse_rad", json!(null), allowed));
     }
     Ok(ReportedResult {
-        label: tell.label,
+        label: tell.label.into(),
         gait_rmse_rad: tell.gait_rmse_rad.filter(|_| converged),
         cost_of_transport: tell.cost_of_transport.filter(|_| converged),
         message: reason.to_owned(),

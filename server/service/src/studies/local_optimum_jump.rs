@@ -4,7 +4,7 @@
 use super::snapshot::StudySnapshot;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{SolveReport, SolveStatus, TunedBounds};
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::Trial;
 use std::cmp::Ordering;
 
 /// Relative difference of objectives beyond which looser bounds show another local optimum. Bounds that are tightened between
@@ -21,7 +21,7 @@ pub(super) fn in_words(snapshot: &StudySnapshot, trial: &Trial, report: &SolveRe
         return Some(format!("Found by a cold start, because the warm start from trial{start} did not converge."));
     }
     let others = || {
-        let converged = snapshot.trials.iter().filter(|other| other.state == TrialState::Converged);
+        let converged = snapshot.trials.iter().filter(|other| other.state.has_gait());
         converged
             .filter(|other| other.id != trial.id)
             .filter_map(|other| Some((other, other.report.as_ref()?.objective)))

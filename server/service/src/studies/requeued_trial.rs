@@ -80,7 +80,8 @@ async fn give_up_or_requeue(
         solve_jobs::requeue(writer, lease.job, after).await?;
         trials::requeue(writer, lease.trial, reason).await?;
     } else {
-        let end = TrialEnd { state, report: None, violations: Vec::new(), message: reason.to_owned() };
+        let end =
+            TrialEnd { state, report: None, mean_strides: None, violations: Vec::new(), message: reason.to_owned() };
         trials::finish(writer, lease.trial, &end).await?;
     }
     tell(writer, lease, state).await?;

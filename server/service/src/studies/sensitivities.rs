@@ -7,7 +7,7 @@ use gait_learner::SearchSpace;
 use gait_optimizer::sensitivity::{BoundSensitivity, GaitSensitivities, GaitSensitivityError, sensitivities};
 use gait_optimizer::{TunedBounds, WarmStart};
 use gaitwright_compute::OnPool;
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::Trial;
 use gaitwright_store::{Connection, Packed, gaits, studies};
 
 /// Largest number of mesh intervals, over the four kinds of domain, of a gait whose sensitivities a request computes:
@@ -56,7 +56,7 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
             "Trial {number} was evaluated by a script, so its solution is not stored here and sensitivities cannot be computed."
         )));
     }
-    if trial.state != TrialState::Converged {
+    if !trial.state.has_gait() {
         let state = has_state(trial.state);
         return Err(Error::conflict(format!("Trial {number} {state}. Only a converged gait has sensitivities.")));
     }

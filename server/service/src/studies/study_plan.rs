@@ -1,15 +1,18 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
 use super::bound_grid::{self, RequestedSearchSpace};
+use super::seed::LARGEST_SEED;
 use super::subject::{self, NewSubject};
-use super::{built_in_entries, membership, study_plan_schemas};
+use super::{built_in_entries, membership, simulated_walks, study_plan_schemas};
 use crate::access::{Caller, Reach};
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{
+    AnswerSource, Evaluation, SimulatedWalks, Study, StudyPlan, StudyState, WarmStartFrom,
+};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -81,6 +84,10 @@ pub struct NewStudy {
     /// The gait from which trials are warm-started.
     #[serde(default = "incumbent")]
     pub warm_start_from: WarmStartFrom,
+    /// Simulated walks with each gait. They do nothing by default.
+    #[serde(default)]
+    #[schema(value_type = study_plan_schemas::SimulatedWalksSchema)]
+    pub simulated_walks: SimulatedWalks,
     /// Number of trials that run in parallel.
     #[serde(default = "one")]
     pub parallel_trials: u32,
@@ -141,6 +148,7 @@ impl NewStudy {
             unchanged_limit: None,
             repeat_results: None,
             warm_start_from: incumbent(),
+            simulated_walks: SimulatedWalks::default(),
             parallel_trials: one(),
             priority: 0,
             seed: one_seed(),
@@ -171,6 +179,7 @@ impl NewStudy {
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
             warm_start_from: plan.warm_start_from,
+            simulated_walks: plan.simulated_walks,
             parallel_trials: plan.parallel_trials,
             priority: plan.priority,
             seed: plan.seed,
@@ -182,9 +191,6 @@ impl NewStudy {
 
 /// Maximum length of a name, characters.
 pub(super) const LONGEST_NAME: usize = 120;
-
-/// The largest seed: many JSON readers keep only 53 bits of an integer.
-pub const LARGEST_SEED: u64 = (1 << 53) - 1;
 
 /// Creates a study.
 ///
@@ -326,6 +332,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
         unchanged_limit: new.unchanged_limit,
         repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
         warm_start_from: new.warm_start_from,
+        simulated_walks: new.simulated_walks,
         parallel_trials: new.parallel_trials,
         priority: new.priority,
         seed: new.seed,
@@ -353,6 +360,7 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     if plan.seed > LARGEST_SEED {
         return Err(Error::invalid("seed", plan.seed, &format!("0 to {LARGEST_SEED}")));
     }
+    simulated_walks::check(plan)?;
     let within = |part: &'static str| move |error: ModelError| FieldError::from(error).within(part);
     plan.gait_settings.validate().map_err(within("gait_settings"))?;
     plan.solve_options.validate().map_err(within("solve_options"))?;

@@ -3,6 +3,7 @@
 use super::actions_with_known_gait::never_active;
 use super::certified_best::{BestCertification, CertificateState};
 use super::snapshot::StudySnapshot;
+use gait_optimizer::execution::ExecutionReport;
 use gait_optimizer::{SolveStatus, TunedBounds};
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::{Label, Trial, TrialState};
@@ -24,6 +25,8 @@ pub struct Summary {
     pub best_gait_rmse_rad: Option<f64>,
     /// Cost of transport of the recommended trial.
     pub best_cost_of_transport: Option<f64>,
+    /// Simulated walks with the recommended gait. Absent if there were none.
+    pub best_simulated_walks: Option<SimulatedWalksSummary>,
     /// State of the certificate of the recommended gait.
     pub best_certificate: CertificateState,
     /// Reasons if that certificate failed.
@@ -34,6 +37,26 @@ pub struct Summary {
     pub never_active: Vec<String>,
     /// Every trial, by number.
     pub trials: Vec<TrialSummary>,
+}
+
+/// The simulated walks of an execution report, over all kinds of ground.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SimulatedWalksSummary {
+    /// Number of simulated walks.
+    pub simulated_walks: u32,
+    /// Number of complete ones.
+    pub completed: u32,
+    /// Mean number of strides.
+    pub mean_strides: f64,
+    /// Seed of the disturbances.
+    pub seed: u64,
+}
+
+impl SimulatedWalksSummary {
+    fn of(report: &ExecutionReport) -> Self {
+        let (completed, simulated_walks) = report.completed_of_all();
+        Self { simulated_walks, completed, mean_strides: report.mean_strides(), seed: report.seed }
+    }
 }
 
 /// A trial of a [`Summary`].
@@ -55,6 +78,8 @@ pub struct TrialSummary {
     pub gait_rmse_rad: Option<f64>,
     /// Cost of transport.
     pub cost_of_transport: Option<f64>,
+    /// Mean strides of the simulated walks on which the result depends.
+    pub mean_strides: Option<f64>,
     /// Interior-point iterations.
     pub iterations: Option<u32>,
     /// Wall time of the solve, s.
@@ -63,8 +88,13 @@ pub struct TrialSummary {
     pub warm_started_from: Option<u32>,
 }
 
-/// The summary of a study with its best trial and the certificates.
-pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, certification: BestCertification) -> Summary {
+/// The summary of a study with its best trial, the certificates and the execution report of the best gait.
+pub fn of(
+    snapshot: &StudySnapshot,
+    best: Option<TrialId>,
+    certification: BestCertification,
+    report: Option<&ExecutionReport>,
+) -> Summary {
     let best = best.and_then(|id| snapshot.trial(id));
     Summary {
         study_id: snapshot.study.id,
@@ -73,6 +103,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>, certification: BestCe
         best_action: best.map(|trial| trial.action),
         best_gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
         best_cost_of_transport: best.and_then(|trial| trial.cost_of_transport),
+        best_simulated_walks: report.map(SimulatedWalksSummary::of),
         best_certificate: certification.certificate,
         best_failures: certification.failures,
         passing: certification.passing.and_then(|id| snapshot.trial(id)).map(|trial| line(trial, &snapshot.trials)),
@@ -96,6 +127,7 @@ fn line(trial: &Trial, all: &[Trial]) -> TrialSummary {
         status: trial.status,
         gait_rmse_rad: trial.gait_rmse_rad,
         cost_of_transport: trial.cost_of_transport,
+        mean_strides: trial.mean_strides,
         iterations: trial.iterations,
         seconds_total: trial.seconds_total,
         warm_started_from: number_of(trial.warm_started_from, all),

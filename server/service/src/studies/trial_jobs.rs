@@ -7,7 +7,7 @@ use super::job_queue::{JobQueue, RequestOrder, RunningJob, TrialJobState};
 use crate::error::Error;
 use crate::job::JobState;
 use gait_optimizer::CancelToken;
-use gaitwright_compute::priority::run_below_solves;
+use gaitwright_compute::priority::run_with;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, consents, trials};
 use std::collections::BTreeSet;
 use std::fmt;
@@ -256,19 +256,19 @@ impl<J: TrialJob> fmt::Debug for TrialJobs<J> {
     }
 }
 
-/// Runs work on a thread with lower priority than solves. The token of the work is cancelled with the job, or if the future is
+/// Runs work on a thread of its own, with this priority. The token of the work is cancelled with the job, or if the future is
 /// dropped.
 ///
 /// # Errors
 /// [`Error::Internal`] if no thread can be started or the work panics.
 pub(super) async fn run_cancellable<T: Send + 'static>(
-    name: &'static str,
+    (name, niceness): (&'static str, i32),
     cancelled: &CancellationToken,
     work: impl FnOnce(&CancelToken) -> T + Send + 'static,
 ) -> Result<T, Error> {
     let cancel = CancelToken::new();
     let (_cancels, of_thread) = (CancelOnDrop(cancel.clone()), cancel.clone());
-    let mut result = run_below_solves(name, move || work(&of_thread))
+    let mut result = run_with(niceness, name, move || work(&of_thread))
         .map_err(|error| Error::Internal(format!("cannot start a thread for the {name}: {error}")))?;
     let result = tokio::select! {
         result = &mut result => result,

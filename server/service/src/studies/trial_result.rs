@@ -1,18 +1,22 @@
 //! Records the result of a trial exactly once: state, label, gait and the preferences that Gait RMSE implies, in one
 //! transaction.
 
+use super::execution;
 use super::feedback_log::{self, PROGRAM};
-use super::gait_rmse_answers::gait_rmse_answers;
+use super::gait_rmse_answers::{ComputedAnswer, gait_rmse_answers};
 use super::local_optimum_jump;
 use super::requeued_trial::{broke, interrupted, tell};
+use super::simulated_walks::{label_of_gait, report_of_each_gait, why_not_executable};
 use super::snapshot::StudySnapshot;
 use super::trial_transitions;
 use crate::error::Error;
+use gait_optimizer::execution::ExecutionReport;
 use gait_optimizer::{SolveOutcome, SolveStatus};
-use gaitwright_store::feedback::FeedbackContent;
+use gaitwright_store::audit::Actor;
 use gaitwright_store::gaits::PackedGait;
 use gaitwright_store::solve_jobs::Lease;
-use gaitwright_store::trials::{TrialEnd, TrialState};
+use gaitwright_store::studies::SimulatedWalksEffect;
+use gaitwright_store::trials::{Label, TrialEnd, TrialState};
 use gaitwright_store::{Store, TrialId, attempts, commit, gaits, solve_jobs, studies, trials};
 use std::time::Duration;
 
@@ -20,6 +24,17 @@ use std::time::Duration;
 const TRIES: u32 = 20;
 /// The pause after the first attempt; it grows by this much after each.
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
+
+/// What a worker and the service computed for a trial.
+#[derive(Debug)]
+pub struct Computed<'a> {
+    /// The outcome of the solve.
+    pub outcome: &'a SolveOutcome,
+    /// Its gait, or the last iterate.
+    pub gait: Option<&'a PackedGait>,
+    /// The execution report, if the result of the trial depends on it.
+    pub report: Option<&'a ExecutionReport>,
+}
 
 /// Records a completed solve. Returns `false` if the lease had passed to another attempt: the result is then kept as
 /// evidence, and not used.
@@ -30,19 +45,19 @@ pub async fn ended(
     store: &mut Store,
     lease: &Lease,
     worker: &str,
-    outcome: &SolveOutcome,
-    gait: Option<&PackedGait>,
+    Computed { outcome, gait, report }: Computed<'_>,
 ) -> Result<bool, Error> {
-    let Some(label) = trial_transitions::label_of(outcome.report.status) else {
+    let Some(solved) = trial_transitions::label_of(outcome.report.status) else {
         return match outcome.report.status {
             SolveStatus::Cancelled => interrupted(store, lease).await,
             _ => broke(store, lease, "The solve ran out of time.").await,
         };
     };
-    let state = TrialState::from(label);
+    let mean_strides = report.map(ExecutionReport::mean_strides);
     let mut end = TrialEnd {
-        state,
+        state: TrialState::from(solved),
         report: Some(outcome.report.clone()),
+        mean_strides,
         violations: outcome.violations.clone(),
         message: message_of(outcome),
     };
@@ -52,11 +67,23 @@ pub async fn ended(
         let study = studies::get(&mut reader, lease.study).await?;
         let snapshot = StudySnapshot::read(&mut reader, study).await?;
         drop(reader);
+        let plan = &snapshot.study.plan;
+        let effect = plan.simulated_walks.effect;
+        let asked = report_of_each_gait(plan);
+        if solved == Label::Converged && effect.is_part_of_result() && report.is_none() {
+            return Err(Error::Internal("the result of a trial lacks its simulated walks".to_owned()));
+        }
+        let label =
+            if solved == Label::Converged { label_of_gait(&plan.simulated_walks, mean_strides) } else { solved };
+        end.state = TrialState::from(label);
         if let Some(fold) = snapshot
             .trial(lease.trial)
             .and_then(|trial| local_optimum_jump::in_words(&snapshot, trial, &outcome.report))
         {
             end.message = fold;
+        }
+        if let (Label::NotExecutable, Some(strides)) = (label, mean_strides) {
+            end.message = why_not_executable(&plan.simulated_walks, strides);
         }
         let answers = answers(store, &snapshot, lease.trial, &end).await?;
 
@@ -75,8 +102,14 @@ pub async fn ended(
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;
         }
+        if let Some(report) = report {
+            let trial = trials::get(&mut writer, lease.trial).await?;
+            execution::write(&mut writer, &trial, asked, report.clone()).await?;
+        } else if label == Label::Converged && effect == SimulatedWalksEffect::Report {
+            execution::request(&mut writer, &Actor::program(), lease.trial, asked).await?;
+        }
         feedback_log::compute(&mut writer, lease.study, (lease.trial, label), &answers, PROGRAM).await?;
-        tell(&mut writer, lease, state).await?;
+        tell(&mut writer, lease, end.state).await?;
         commit(writer).await?;
         return Ok(true);
     }
@@ -90,11 +123,11 @@ async fn answers(
     snapshot: &StudySnapshot,
     new: TrialId,
     end: &TrialEnd,
-) -> Result<Vec<FeedbackContent>, Error> {
+) -> Result<Vec<ComputedAnswer>, Error> {
     let rmse = end.report.as_ref().map(|report| report.gait_rmse_rad);
     let (TrialState::Converged, Some(rmse)) = (end.state, rmse) else { return Ok(Vec::new()) };
-    let snapshot = snapshot.clone();
-    store.compute(move |pool| gait_rmse_answers(pool, &snapshot, new, rmse)).await?
+    let (snapshot, mean_strides) = (snapshot.clone(), end.mean_strides);
+    store.compute(move |pool| gait_rmse_answers(pool, &snapshot, new, rmse, mean_strides)).await?
 }
 
 fn message_of(outcome: &SolveOutcome) -> String {

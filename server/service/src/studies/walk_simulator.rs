@@ -5,6 +5,7 @@ use super::job_queue::TrialJobState;
 use super::trial_jobs::{TrialJob, run_cancellable};
 use crate::error::Error;
 use gait_optimizer::execution::simulate;
+use gaitwright_compute::priority::AFTERWARDS;
 use gaitwright_store::{Store, StoreResult, TrialId, cancelled_jobs, execution_reports};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -63,9 +64,8 @@ impl TrialJob for WalkSimulator {
         let mut store = self.store.clone();
         let gait = execution::gait_of(&mut *store.read().await?, trial).await?;
         let gait = store.compute(move |pool| gait.unpack(pool)).await??;
-        match run_cancellable("walk simulator", &cancelled, move |cancel| simulate(&gait, &options, &done, cancel))
-            .await??
-        {
+        let work = move |cancel: &_| simulate(&gait, &options, &done, cancel);
+        match run_cancellable(("walk simulator", AFTERWARDS), &cancelled, work).await?? {
             Some(report) => execution::record(&self.store, trial, asked, report).await,
             None => Ok(()),
         }

@@ -5,7 +5,6 @@ use super::snapshot::StudySnapshot;
 use gait_learner::{LearnerError, Posterior};
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::WarmStartFrom;
-use gaitwright_store::trials::TrialState;
 
 /// The trial from whose gait the next solve starts.
 ///
@@ -18,9 +17,9 @@ pub fn warm_start_of_next(snapshot: &StudySnapshot, posterior: &Posterior) -> Re
     }
 }
 
-/// The first converged trial.
+/// The first trial with a gait. The root gait stays the same whether or not it is executable.
 fn root_trial(snapshot: &StudySnapshot) -> Option<TrialId> {
-    snapshot.trials.iter().find(|trial| trial.state == TrialState::Converged).map(|trial| trial.id)
+    snapshot.trials.iter().find(|trial| trial.state.has_gait()).map(|trial| trial.id)
 }
 
 /// Whether a study has to wait for its root gait before the next trial.

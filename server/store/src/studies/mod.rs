@@ -2,6 +2,7 @@
 
 mod lists;
 mod plan;
+mod simulated_walks;
 mod study_state;
 
 pub use lists::{
@@ -9,6 +10,7 @@ pub use lists::{
     page, tags, waiting_for_people, with_safety_reports,
 };
 pub use plan::{AnswerSource, Evaluation, StudyPlan, WarmStartFrom};
+pub use simulated_walks::{SimulatedWalks, SimulatedWalksEffect};
 pub use study_state::StudyState;
 
 use super::{Connection, Instant, StoreError, StoreResult, StudyId, json_columns, now};
@@ -60,7 +62,7 @@ pub async fn insert(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, answer_source, number_of_trials, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, cloned_from, created_at, updated_at, \
-         height_m, body_mass_kg, repeat_results, warm_start_from) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         height_m, body_mass_kg, repeat_results, warm_start_from, simulated_walks) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(&plan.name)
@@ -89,6 +91,7 @@ pub async fn insert(
     .bind(plan.body.body_mass_kg)
     .bind(plan.repeat_results)
     .bind(plan.warm_start_from.as_str())
+    .bind(json_columns::to_text("simulated walks", &plan.simulated_walks)?)
     .execute(db)
     .await?;
     Ok(Study {
@@ -211,6 +214,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             unchanged_limit: row.try_get("unchanged_limit")?,
             repeat_results: row.try_get("repeat_results")?,
             warm_start_from: row.try_get::<&str, _>("warm_start_from")?.parse()?,
+            simulated_walks: json_columns::column(row, "simulated_walks")?,
             parallel_trials: row.try_get("parallel_trials")?,
             priority: row.try_get("priority")?,
             seed: u64::try_from(row.try_get::<i64, _>("seed")?).unwrap_or(0),

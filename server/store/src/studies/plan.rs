@@ -1,5 +1,6 @@
 //! Set-up of a study.
 
+use super::simulated_walks::SimulatedWalks;
 use crate::{DeviceId, ReferenceGaitId, StoreError, StoreResult, SubjectId};
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, Subject as Body, TunedBounds};
@@ -142,6 +143,8 @@ pub struct StudyPlan {
     pub repeat_results: bool,
     /// The gait from which trials are warm-started.
     pub warm_start_from: WarmStartFrom,
+    /// Simulated walks with each gait.
+    pub simulated_walks: SimulatedWalks,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     pub parallel_trials: u32,
     /// Priority, -10 to 10. Higher values run first.

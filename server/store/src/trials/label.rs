@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too.
+/// Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too;
+/// `not_executable`, it found a gait whose simulated walks are too short for the study, which is a result like
+/// `not_converged`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Label {
@@ -14,6 +16,8 @@ pub enum Label {
     Converged,
     /// The evaluation found no gait.
     NotConverged,
+    /// The evaluation found a gait, but simulated walks with it are too short for the study.
+    NotExecutable,
 }
 
 impl Label {
@@ -28,6 +32,7 @@ impl From<Label> for TrialState {
         match label {
             Label::Converged => Self::Converged,
             Label::NotConverged => Self::NotConverged,
+            Label::NotExecutable => Self::NotExecutable,
         }
     }
 }
@@ -38,11 +43,12 @@ impl TrialState {
         match self {
             Self::Converged => Some(Label::Converged),
             Self::NotConverged => Some(Label::NotConverged),
+            Self::NotExecutable => Some(Label::NotExecutable),
             Self::Queued | Self::Running | Self::Failed | Self::Lost | Self::Cancelled => None,
         }
     }
 
-    /// Whether it is a result for the learner: converged or not converged.
+    /// Whether it is a result for the learner: converged, not converged or not executable.
     pub fn is_result(self) -> bool {
         self.label().is_some()
     }
@@ -51,7 +57,7 @@ impl TrialState {
 impl FromStr for Label {
     type Err = StoreError;
     fn from_str(text: &str) -> StoreResult<Self> {
-        [Self::Converged, Self::NotConverged]
+        [Self::Converged, Self::NotConverged, Self::NotExecutable]
             .into_iter()
             .find(|label| label.as_str() == text)
             .ok_or_else(|| StoreError::unknown_value("label", text))

@@ -40,11 +40,13 @@ pub struct Trial {
     pub state: TrialState,
     /// How the solve ended.
     pub status: Option<SolveStatus>,
-    /// Gait RMSE of a converged gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
+    /// Gait RMSE of a gait, rad. If the trial did not converge, `report` has the Gait RMSE of the last
     /// iterate.
     pub gait_rmse_rad: Option<f64>,
-    /// Cost of transport of a converged gait, dimensionless.
+    /// Cost of transport of a gait, dimensionless.
     pub cost_of_transport: Option<f64>,
+    /// Mean strides of the simulated walks on which the result depends. Absent if it depends on none.
+    pub mean_strides: Option<f64>,
     /// Objective of the solve.
     pub objective: Option<f64>,
     /// Largest violation, scaled.
@@ -91,6 +93,8 @@ pub struct TrialEnd {
     pub state: TrialState,
     /// Figures of a completed solve.
     pub report: Option<SolveReport>,
+    /// Mean strides of the simulated walks on which the result depends.
+    pub mean_strides: Option<f64>,
     /// Most violated rows.
     pub violations: Vec<Violation>,
     /// Message for people; may be empty.
@@ -245,7 +249,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     let report = solve_report.map(|r| json_columns::readable("report", r)).transpose()?.flatten();
     let violations: Vec<&Violation> = end.violations.iter().filter(|v| v.amount.is_finite()).collect();
     sqlx::query(
-        "update trials set state = ?, status = ?, gait_rmse_rad = ?, cost_of_transport = ?, objective = ?, \
+        "update trials set state = ?, status = ?, gait_rmse_rad = ?, cost_of_transport = ?, mean_strides = ?, objective = ?, \
          max_violation = ?, iterations = ?, seconds_total = ?, report = ?, violations = ?, message = ?, \
          finished_at = ? where id = ?",
     )
@@ -253,6 +257,7 @@ pub async fn finish(db: &mut Connection, id: TrialId, end: &TrialEnd) -> StoreRe
     .bind(status)
     .bind(finite(|r| r.gait_rmse_rad))
     .bind(finite(|r| r.cost_of_transport))
+    .bind(end.mean_strides)
     .bind(finite(|r| r.objective))
     .bind(finite(|r| r.max_violation))
     .bind(solve_report.map(|r| i64::try_from(r.iterations).unwrap_or(i64::MAX)))
@@ -314,10 +319,10 @@ pub async fn tell(db: &mut Connection, id: TrialId, result: &ReportedResult) -> 
     Ok(())
 }
 
-/// A figure of a converged gait; `None` for other trials, whose last iterate is not a gait.
+/// A figure of a gait; `None` for trials without one, whose last iterate is not a gait.
 pub(super) fn of_a_gait(row: &SqliteRow, state: TrialState, column: &str) -> StoreResult<Option<f64>> {
     let figure: Option<f64> = row.try_get(column)?;
-    Ok(figure.filter(|_| state == TrialState::Converged))
+    Ok(figure.filter(|_| state.has_gait()))
 }
 
 fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
@@ -336,6 +341,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Trial> {
         status: json_columns::optional_column(row, "status")?,
         gait_rmse_rad: of_a_gait(row, state, "gait_rmse_rad")?,
         cost_of_transport: of_a_gait(row, state, "cost_of_transport")?,
+        mean_strides: row.try_get("mean_strides")?,
         objective: row.try_get("objective")?,
         max_violation: row.try_get("max_violation")?,
         iterations: row.try_get("iterations")?,

@@ -14,6 +14,8 @@ pub struct TrialCounts {
     pub converged: u32,
     /// Trials that did not converge.
     pub not_converged: u32,
+    /// Trials with a gait that is not executable.
+    pub not_executable: u32,
     /// Failed, lost or cancelled trials.
     pub without_result: u32,
 }
@@ -21,7 +23,7 @@ pub struct TrialCounts {
 impl TrialCounts {
     /// Number of trials with a result.
     pub fn results(&self) -> u32 {
-        self.converged + self.not_converged
+        self.converged + self.not_converged + self.not_executable
     }
 }
 
@@ -36,6 +38,7 @@ pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCou
          coalesce(sum(iif(state in ('queued', 'running'), trials, 0)), 0) as open, \
          coalesce(sum(iif(state = 'converged', trials, 0)), 0) as converged, \
          coalesce(sum(iif(state = 'not_converged', trials, 0)), 0) as not_converged, \
+         coalesce(sum(iif(state = 'not_executable', trials, 0)), 0) as not_executable, \
          coalesce(sum(iif(state in ('failed', 'lost', 'cancelled'), trials, 0)), 0) as without_result \
          from counted",
     )
@@ -47,6 +50,7 @@ pub async fn counts(db: &mut Connection, study: StudyId) -> StoreResult<TrialCou
         open: row.try_get("open")?,
         converged: row.try_get("converged")?,
         not_converged: row.try_get("not_converged")?,
+        not_executable: row.try_get("not_executable")?,
         without_result: row.try_get("without_result")?,
     })
 }
@@ -83,7 +87,7 @@ pub struct SolveTimes {
 pub async fn measured(db: &mut Connection, muscles: bool) -> StoreResult<Option<SolveTimes>> {
     let rows = sqlx::query(
         "select seconds_total from (select t.seconds_total from trials t join studies s on s.id = t.study_id \
-         where s.muscles = ? and t.seconds_total is not null and t.state in ('converged', 'not_converged') \
+         where s.muscles = ? and t.seconds_total is not null and t.state in ('converged', 'not_converged', 'not_executable') \
          order by t.id desc limit 200) order by seconds_total",
     )
     .bind(muscles)

@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// State of a trial. `queued` and `running` trials are open. `converged` and `not_converged` are results; `failed`
-/// (error, crash or time limit), `lost` (the worker stopped responding) and `cancelled` are not.
+/// State of a trial. `queued` and `running` trials are open. `converged`, `not_converged` and
+/// `not_executable` (a gait whose simulated walks are too short for the study) are results; `failed` (error, crash or time
+/// limit), `lost` (the worker stopped responding) and `cancelled` are not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TrialState {
@@ -18,6 +19,8 @@ pub enum TrialState {
     Converged,
     /// The solve ended without a gait. Also a result.
     NotConverged,
+    /// The solve found a gait, but simulated walks with it are too short for the study. Also a result.
+    NotExecutable,
     /// The program failed by a panic, an error or the time limit. Not a result.
     Failed,
     /// The workers stopped responding. Not a result.
@@ -28,8 +31,16 @@ pub enum TrialState {
 
 impl TrialState {
     /// Every state.
-    pub const ALL: [Self; 7] =
-        [Self::Queued, Self::Running, Self::Converged, Self::NotConverged, Self::Failed, Self::Lost, Self::Cancelled];
+    pub const ALL: [Self; 8] = [
+        Self::Queued,
+        Self::Running,
+        Self::Converged,
+        Self::NotConverged,
+        Self::NotExecutable,
+        Self::Failed,
+        Self::Lost,
+        Self::Cancelled,
+    ];
 
     /// The name in the record and in REST.
     pub fn as_str(self) -> &'static str {
@@ -38,10 +49,16 @@ impl TrialState {
             Self::Running => "running",
             Self::Converged => "converged",
             Self::NotConverged => "not_converged",
+            Self::NotExecutable => "not_executable",
             Self::Failed => "failed",
             Self::Lost => "lost",
             Self::Cancelled => "cancelled",
         }
+    }
+
+    /// Whether the solve found a gait. Only a converged gait may reach a person.
+    pub fn has_gait(self) -> bool {
+        matches!(self, Self::Converged | Self::NotExecutable)
     }
 
     /// Whether it is queued or running.

@@ -69,7 +69,8 @@ class StudiesMethods(Transport):
 
         Fields: subject_id; optionally answer_source, base_bounds, device_id, evaluation, gait_settings, learner,
         muscles, name, number_of_trials, parallel_trials, priority, reference_gait_id, repeat_results, restricted,
-        search_space, seed, solve_options, solve_seconds_budget, start, unchanged_limit, warm_start_from.
+        search_space, seed, simulated_walks, solve_options, solve_seconds_budget, start, unchanged_limit,
+        warm_start_from.
         """
         return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 

@@ -6,6 +6,7 @@ use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::StudyId;
+use gaitwright_store::studies::SimulatedWalksEffect;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -49,6 +50,14 @@ pub(crate) struct NewStudyFields {
     /// Present when ticked.
     #[serde(default)]
     pub(super) warm_start_from_root: Option<String>,
+    #[serde(rename = "simulated_walks.effect", default = "no_walks")]
+    pub(super) walks_effect: String,
+    #[serde(rename = "simulated_walks.number", default)]
+    pub(super) walks_number: String,
+    #[serde(rename = "simulated_walks.gait_rmse_tolerance_rad", default)]
+    pub(super) gait_rmse_tolerance_rad: String,
+    #[serde(rename = "simulated_walks.least_mean_strides", default)]
+    pub(super) least_mean_strides: String,
     #[serde(default)]
     pub(super) nearest_within_percent: String,
     /// Whether bounds were relaxed in a clone, so that the table of bounds has to be shown.
@@ -57,6 +66,10 @@ pub(crate) struct NewStudyFields {
     /// The entries of the search space, which the editor reads.
     #[serde(flatten)]
     pub(super) space: BTreeMap<String, String>,
+}
+
+fn no_walks() -> String {
+    SimulatedWalksEffect::None.as_str().to_owned()
 }
 
 fn linecospar() -> String {
@@ -86,6 +99,10 @@ impl Default for NewStudyFields {
             seed: text("1"),
             repeat_results: None,
             warm_start_from_root: None,
+            walks_effect: no_walks(),
+            walks_number: String::new(),
+            gait_rmse_tolerance_rad: String::new(),
+            least_mean_strides: String::new(),
             nearest_within_percent: String::new(),
             relaxed: false,
             space: BTreeMap::new(),
@@ -122,6 +139,10 @@ impl NewStudyFields {
             "unchanged_limit" => self.unchanged_limit.clear(),
             "parallel_trials" => self.parallel_trials = default.parallel_trials,
             "seed" => self.seed = default.seed,
+            "simulated_walks.effect" => self.walks_effect = default.walks_effect,
+            "simulated_walks.number" => self.walks_number.clear(),
+            "simulated_walks.gait_rmse_tolerance_rad" => self.gait_rmse_tolerance_rad.clear(),
+            "simulated_walks.least_mean_strides" => self.least_mean_strides.clear(),
             "nearest_within_percent" => self.nearest_within_percent.clear(),
             _ => {
                 let bound = field.rsplit('_').next().unwrap_or_default();
@@ -169,6 +190,22 @@ pub(super) fn learner(name: &str) -> Option<LearnerSettings> {
     }
 }
 
+/// What simulated walks can do: effect, label and explanation.
+pub(super) const WALKS_EFFECTS: [(SimulatedWalksEffect, &str, &str); 4] = [
+    (SimulatedWalksEffect::None, "Nothing", "walks are simulated only on request, on the page of a gait"),
+    (SimulatedWalksEffect::Report, "Report", "each gait gets an execution report, which changes no trial"),
+    (
+        SimulatedWalksEffect::TieBreak,
+        "Break ties",
+        "of two gaits with nearly the same Gait RMSE, the one that walks more strides is better",
+    ),
+    (
+        SimulatedWalksEffect::Label,
+        "Label gaits",
+        "a gait that walks too few strides is not executable: the learner avoids it, and it is never recommended",
+    ),
+];
+
 /// The option of the subject field that stands for a new subject.
 pub(super) const NEW_SUBJECT: &str = "new";
 
@@ -179,8 +216,19 @@ pub(super) const DESCRIPTION: [&str; 3] = ["pseudonym", "height_m", "body_mass_k
 pub(super) fn place_in_form(field: &str) -> usize {
     const BEFORE_BOUNDS: [&str; 7] =
         ["subject", "pseudonym", "height_m", "body_mass_kg", "device", "reference_gait", "muscles"];
-    const AFTER_BOUNDS: [&str; 7] =
-        ["answer_source", "number_of_trials", "name", "learner", "unchanged_limit", "parallel_trials", "seed"];
+    const AFTER_BOUNDS: [&str; 11] = [
+        "answer_source",
+        "number_of_trials",
+        "name",
+        "learner",
+        "unchanged_limit",
+        "parallel_trials",
+        "seed",
+        "simulated_walks.effect",
+        "simulated_walks.number",
+        "simulated_walks.gait_rmse_tolerance_rad",
+        "simulated_walks.least_mean_strides",
+    ];
     let before = BEFORE_BOUNDS.iter().position(|known| *known == field);
     let after = || AFTER_BOUNDS.iter().position(|known| *known == field).map(|place| place + BEFORE_BOUNDS.len() + 1);
     before.or_else(after).unwrap_or(if field.len() < 4 || field.contains("_a") { 7 } else { usize::MAX })
@@ -203,6 +251,10 @@ fn label(field: &str) -> String {
         "unchanged_limit" => "Stop early after",
         "parallel_trials" => "Parallel trials",
         "seed" => "Seed",
+        "simulated_walks.effect" => "Simulated walks",
+        "simulated_walks.number" => "Number of simulated walks on each ground",
+        "simulated_walks.gait_rmse_tolerance_rad" => "Gait RMSE tolerance, rad",
+        "simulated_walks.least_mean_strides" => "Least mean number of strides",
         "nearest_within_percent" => "Objective tolerance, %",
         other => other,
     };

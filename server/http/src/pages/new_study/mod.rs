@@ -8,7 +8,7 @@ mod tuned_and_fixed_bounds;
 
 use self::chosen_reference::ReferenceChoice;
 use self::clone::cloned;
-use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal};
+use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, WALKS_EFFECTS, as_refusal};
 use self::planning::{faults, make};
 use self::tuned_and_fixed_bounds::SpaceEditor;
 use crate::AppState;
@@ -29,7 +29,7 @@ use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::sample_study;
 use gaitwright_store::devices::Device;
 use gaitwright_store::reference_gaits::ReferenceGait;
-use gaitwright_store::studies::{self, Study, StudyPlan};
+use gaitwright_store::studies::{self, SimulatedWalks, SimulatedWalksEffect, Study, StudyPlan};
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{
     Connection, StoreError, StudyId, SubjectId, commit, consents, devices, members, reference_gaits, trials,
@@ -65,6 +65,9 @@ struct NewStudyPage {
     units: Units,
     offered: FormChoices,
     learners: &'static [(&'static str, &'static str, &'static str)],
+    walks_effects: &'static [(SimulatedWalksEffect, &'static str, &'static str)],
+    /// The defaults of simulated walks.
+    walks: SimulatedWalks,
     fields: NewStudyFields,
     editor: SpaceEditor,
     /// Every refused field.
@@ -122,9 +125,20 @@ impl NewStudyPage {
     fn expert(&self) -> bool {
         let (typed, default) = (&self.fields, NewStudyFields::default());
         let fields = |fields: &NewStudyFields| {
-            let NewStudyFields { learner, unchanged_limit, parallel_trials, seed, nearest_within_percent, .. } =
-                fields.clone();
-            [learner, unchanged_limit, parallel_trials, seed, nearest_within_percent]
+            let NewStudyFields {
+                learner,
+                unchanged_limit,
+                parallel_trials,
+                seed,
+                walks_effect,
+                walks_number,
+                gait_rmse_tolerance_rad,
+                least_mean_strides,
+                nearest_within_percent,
+                ..
+            } = fields.clone();
+            let walks = [walks_effect, walks_number, gait_rmse_tolerance_rad, least_mean_strides];
+            ([learner, unchanged_limit, parallel_trials, seed, nearest_within_percent], walks)
         };
         fields(typed) != fields(&default) || typed.repeat_results.is_some() || typed.warm_start_from_root.is_some()
     }
@@ -202,7 +216,20 @@ async fn show(
     let not_offered = not_offered(&mut reader, &offered.subjects, &fields.subject).await?;
     drop(reader);
     let editor = SpaceEditor::typed(&fields.space)?;
-    page(&NewStudyPage { units, offered, learners: &LEARNERS, fields, editor, refused, cloned, reference, not_offered })
+    let (walks_effects, walks) = (&WALKS_EFFECTS, SimulatedWalks::default());
+    page(&NewStudyPage {
+        units,
+        offered,
+        learners: &LEARNERS,
+        walks_effects,
+        walks,
+        fields,
+        editor,
+        refused,
+        cloned,
+        reference,
+        not_offered,
+    })
 }
 
 /// Why the chosen subject cannot have a new study. Empty if it can, and if none is chosen.

@@ -6,9 +6,10 @@ use super::tuned_and_fixed_bounds::SpaceEditor;
 use gait_optimizer::{LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::studies::seed;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
-use gaitwright_store::studies::{AnswerSource, Study, StudyPlan, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, SimulatedWalks, SimulatedWalksEffect, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::str::FromStr;
 
@@ -149,17 +150,38 @@ fn study_of(
         number_of_trials: number("number_of_trials", &fields.number_of_trials, "1 to 10000")?,
         unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
-        seed: number("seed", &fields.seed, &format!("0 to {}", study_plan::LARGEST_SEED))?,
+        seed: number("seed", &fields.seed, &format!("0 to {}", seed::LARGEST_SEED))?,
         repeat_results: Some(fields.repeat_results.is_some()),
         warm_start_from: if fields.warm_start_from_root.is_some() {
             WarmStartFrom::Root
         } else {
             WarmStartFrom::Incumbent
         },
+        simulated_walks: simulated_walks(fields)?,
         restricted: fields.restricted.is_some(),
         subject_id: subject,
         start: true,
         ..base
+    })
+}
+
+/// Empty numbers have their defaults.
+fn simulated_walks(fields: &NewStudyFields) -> Result<SimulatedWalks, Error> {
+    let default = SimulatedWalks::default();
+    let effect = SimulatedWalksEffect::ALL.into_iter().find(|effect| effect.as_str() == fields.walks_effect);
+    let names = SimulatedWalksEffect::ALL.map(SimulatedWalksEffect::as_str).join(", ");
+    let strides = "simulated_walks.least_mean_strides";
+    let tolerance = "simulated_walks.gait_rmse_tolerance_rad";
+    Ok(SimulatedWalks {
+        effect: effect.ok_or_else(|| {
+            Error::invalid("simulated_walks.effect", fields.walks_effect.as_str(), &format!("one of {names}"))
+        })?,
+        number: optional("simulated_walks.number", &fields.walks_number, "1 to 1000, or empty")?
+            .unwrap_or(default.number),
+        gait_rmse_tolerance_rad: optional(tolerance, &fields.gait_rmse_tolerance_rad, "0 to 10, or empty")?
+            .unwrap_or(default.gait_rmse_tolerance_rad),
+        least_mean_strides: optional(strides, &fields.least_mean_strides, "0 to 20, or empty")?
+            .unwrap_or(default.least_mean_strides),
     })
 }
 

@@ -55,6 +55,8 @@ struct StudyPage {
     last_event: i64,
     variant: &'static str,
     answer_source: &'static str,
+    /// What simulated walks do; `None` if nothing.
+    simulated_walks: Option<String>,
     may_administer: bool,
     /// Imports; empty if the study was created here.
     imports: Vec<Import>,
@@ -104,6 +106,7 @@ pub(super) async fn get(
     let may_administer = authorized.caller.may(Administer::NEEDED);
     let (variant, answer_source) =
         (format::variant(study.plan.muscles), format::answer_source(study.plan.answer_source));
+    let simulated_walks = format::simulated_walks(&study.plan.simulated_walks);
     page(&StudyPage {
         units,
         study,
@@ -117,6 +120,7 @@ pub(super) async fn get(
         last_event,
         variant,
         answer_source,
+        simulated_walks,
         may_administer,
         imports,
     })

@@ -6,7 +6,7 @@ use super::Scheduler;
 use super::prefetched_solves::{PREPARED, Prepared};
 use crate::dispatch_error::DispatchError;
 use crate::error::Error;
-use crate::workers::{Assignment, Attempt};
+use crate::workers::{Assignment, Attempt, Receipt};
 use gaitwright_store::solve_jobs::{self, Lease};
 use gaitwright_store::{Store, TrialId, commit, now, trials};
 
@@ -52,8 +52,7 @@ impl Scheduler {
             Prepared::Done(result) => {
                 drop(hand_over);
                 self.started(attempt, PREPARED).await?;
-                self.ended(attempt, PREPARED, result).await?;
-                self.changed();
+                self.record_in_background(attempt, PREPARED.to_owned(), result, Receipt::not_needed());
                 return Ok(());
             }
         }

@@ -5,7 +5,7 @@ use super::answer_changes::answer_changes;
 use super::context::{at, of_gaits};
 use crate::error::Error;
 use crate::printable;
-use crate::studies::gait_rmse_answers::by_gait_rmse;
+use crate::studies::gait_rmse_answers::{ComparedGait, answer};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
 use gaitwright_store::lab_sessions::LabSession;
 use gaitwright_store::studies::{AnswerSource, Study};
@@ -139,17 +139,17 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
                     if study.plan.answer_source == AnswerSource::People {
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());
                     }
-                    let (Some(one), Some(other)) = (a.gait_rmse_rad, b.gait_rmse_rad) else {
+                    let (Some(one), Some(other)) = (ComparedGait::of(a), ComparedGait::of(b)) else {
                         return Err(
                             "Gait RMSE answers a comparison, but one of the two trials has no Gait RMSE".to_owned()
                         );
                     };
-                    let expected = by_gait_rmse((a.id, one), (b.id, other));
+                    let expected = answer(&study.plan.simulated_walks, one, other).content;
                     if pair(&expected) != pair(&row.content)
                         || std::mem::discriminant(&expected) != std::mem::discriminant(&row.content)
                         || matches!((expected, row.content), (FeedbackContent::Preference { winner, .. }, FeedbackContent::Preference { winner: told, .. }) if winner != told)
                     {
-                        return Err("the preference contradicts Gait RMSE".to_owned());
+                        return Err("the preference contradicts Gait RMSE and simulated walks".to_owned());
                     }
                 }
                 Source::Subject | Source::Clinician | Source::Script => {}

@@ -29,13 +29,14 @@ use std::sync::Arc;
 use uuid::Uuid;
 
 /// Columns that the modules of their tables parse and check.
-const READ_BY_NOUN: [&str; 12] = [
+const READ_BY_NOUN: [&str; 13] = [
     "definition",
     "gait_settings",
     "solve_options",
     "base_bounds",
     "search_space",
     "learner",
+    "simulated_walks",
     "action",
     "report",
     "violations",

@@ -1,13 +1,13 @@
 //! Checks the trials of an imported archive: their values, gaits and results.
 
 use super::context::Context;
-use crate::studies::{bound_grid, trial_transitions};
+use crate::studies::{bound_grid, simulated_walks, trial_transitions};
 use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::solve::CONVERGED_VIOLATION;
 use gait_optimizer::{Gait, GaitResults, ReferenceGait, WarmStart};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::studies::StudyPlan;
-use gaitwright_store::trials::{Trial, TrialState};
+use gaitwright_store::trials::{Label, Trial, TrialState};
 use gaitwright_store::{Connection, StoreError, attempts, gaits};
 use std::sync::Arc;
 
@@ -27,6 +27,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     let results = [
         ("gait_rmse_rad", trial.gait_rmse_rad),
         ("cost_of_transport", trial.cost_of_transport),
+        ("mean_strides", trial.mean_strides),
         ("max_violation", trial.max_violation),
         ("seconds_total", trial.seconds_total),
     ];
@@ -36,22 +37,27 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         }
     }
     if trial.script.is_some() || !trial.state.is_result() {
-        let none = trial.report.is_none() && trial.status.is_none();
+        let none = trial.report.is_none() && trial.status.is_none() && trial.mean_strides.is_none();
         return if none { Ok(()) } else { Err("it has a solve report or a status, but no solve".to_owned()) };
     }
-    let state = trial.status.and_then(trial_transitions::label_of).map(TrialState::from);
+    let walks = &plan.simulated_walks;
+    let solved = trial.status.and_then(trial_transitions::label_of);
+    let state = solved.map(|label| match label {
+        Label::Converged => simulated_walks::label_of_gait(walks, trial.mean_strides),
+        other => other,
+    });
+    let state = state.map(TrialState::from);
     if state != Some(trial.state) {
         let status = serde_json::json!(trial.status);
         return Err(format!("status {status} contradicts the state {}", trial.state.as_str()));
     }
+    if trial.mean_strides.is_some() != (trial.state.has_gait() && walks.effect.is_part_of_result()) {
+        return Err("its mean_strides do not fit the setting simulated_walks of the study".to_owned());
+    }
     let Some(report) = &trial.report else {
-        return if trial.state == TrialState::Converged {
-            Err("the solve report is missing".to_owned())
-        } else {
-            Ok(())
-        };
+        return if trial.state.has_gait() { Err("the solve report is missing".to_owned()) } else { Ok(()) };
     };
-    let converged = trial.state == TrialState::Converged;
+    let converged = trial.state.has_gait();
     let of_gait = |figure: f64| converged.then_some(figure);
     let same = Some(report.status) == trial.status
         && trial.gait_rmse_rad == of_gait(report.gait_rmse_rad)
@@ -120,7 +126,7 @@ fn solved(trial: &Trial, context: &Context, gait: &Gait, warm_start: &WarmStart)
         return Err("its warm start belongs to another problem".to_owned());
     }
     same_values(trial, gait, &context.reference)?;
-    if trial.state == TrialState::Converged {
+    if trial.state.has_gait() {
         let error = progress_error_m(gait).map_err(|e| e.to_string())?;
         let follows = error <= HIP_PROGRESS_M;
         if !follows {
