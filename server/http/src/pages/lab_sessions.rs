@@ -98,7 +98,7 @@ async fn show_list(
     };
     let shown = |session| {
         let view = LabSessionView::from(&session);
-        let (name_in_lab, state) = (lab::name_in_lab(view.id), words(view.state.as_str()));
+        let (name_in_lab, state) = (lab::name_in_lab(view.id), state_in_words(&view));
         (view, name_in_lab, state)
     };
     page(&SessionsPage {
@@ -160,6 +160,27 @@ struct SessionPage {
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
     session: LabSessionView,
+}
+
+impl SessionPage {
+    /// Whether nothing is left to do on the tablet.
+    fn is_complete(&self) -> bool {
+        is_complete(&self.session)
+    }
+}
+
+/// Whether every walk and the answer of the subject are recorded.
+fn is_complete(session: &LabSessionView) -> bool {
+    session.answer.is_some() && session.walks.iter().all(|walk| walk.recorded.is_some())
+}
+
+/// The state of a session. A session stays open for files after its last answer.
+fn state_in_words(session: &LabSessionView) -> String {
+    match (&session.closed, &session.unblinded) {
+        (None, Some(_)) => "unblinded".to_owned(),
+        (None, None) if is_complete(session) => "all walks and the answer recorded".to_owned(),
+        _ => words(session.state.as_str()),
+    }
 }
 
 /// The results of the EMG recordings.
@@ -288,7 +309,7 @@ pub(super) async fn show(
     page(&SessionPage {
         study,
         name_in_lab: lab::name_in_lab(session.id),
-        state: words(session.state.as_str()),
+        state: state_in_words(&session),
         gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
         walks: session
             .walks
