@@ -1,5 +1,6 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
+use super::lab_session_state::{is_complete, state_in_words};
 use super::measurement_forms::{FilterFields, Forms};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
@@ -9,7 +10,7 @@ use crate::extractors::Form;
 use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
 use crate::form_errors;
-use crate::format::{self, words};
+use crate::format;
 use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
@@ -169,20 +170,6 @@ impl SessionPage {
     }
 }
 
-/// Whether every walk and the answer of the subject are recorded.
-fn is_complete(session: &LabSessionView) -> bool {
-    session.answer.is_some() && session.walks.iter().all(|walk| walk.recorded.is_some())
-}
-
-/// The state of a session. A session stays open for files after its last answer.
-fn state_in_words(session: &LabSessionView) -> String {
-    match (&session.closed, &session.unblinded) {
-        (None, Some(_)) => "unblinded".to_owned(),
-        (None, None) if is_complete(session) => "all walks and the answer recorded".to_owned(),
-        _ => words(session.state.as_str()),
-    }
-}
-
 /// The results of the EMG recordings.
 struct MeasuredActivity {
     how: String,
@@ -306,6 +293,17 @@ pub(super) async fn show(
         (session, emg, drawings)
     };
     let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
+    let recorded: Vec<u8> =
+        session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect();
+    // The newest file of each kind is used, so an upload begins with a walk that has none.
+    let has_file = |walk: u8, kind| recordings.iter().any(|file| file.kind == kind && file.walk == walk);
+    let next = |kind| recorded.iter().copied().find(|walk| !has_file(*walk, kind)).unwrap_or_default();
+    if forms.emg.walk == 0 {
+        forms.emg.walk = next(MeasurementKind::Emg);
+    }
+    if forms.joint_angles.walk == 0 {
+        forms.joint_angles.walk = next(MeasurementKind::JointAngles);
+    }
     page(&SessionPage {
         study,
         name_in_lab: lab::name_in_lab(session.id),
@@ -318,7 +316,7 @@ pub(super) async fn show(
             .collect(),
         may_run: caller.may(Run::NEEDED),
         may_unblind: caller.may(Administer::NEEDED),
-        recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
+        recorded,
         has_emg: recordings.iter().any(|recording| recording.kind == MeasurementKind::Emg),
         recordings,
         filters: forms
