@@ -23,5 +23,7 @@ if (place) {
     link.textContent = "Reload this page";
     place.replaceChildren("The next comparison may be ready. ", link, "; what you typed here will be lost.");
   };
-  for (const kind of ["study_changed", "gait_certified"]) source.addEventListener(kind, update);
+  source.addEventListener("study_changed", update);
+  // After an answer the study changes with the next comparison; before the first one, each certificate changes what the page says.
+  if (!place.closest(".notice.good")) source.addEventListener("gait_certified", update);
 }

@@ -264,7 +264,8 @@ async fn browser_remembers_the_columns_of_trials_and_shows_few_of_them_on_a_phon
     let study = site.service.study(|new| new.number_of_trials = 5).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
     let address = site.at(&format!("/studies/{study}"));
-    let shown = "[...document.querySelectorAll('.trials tbody tr:first-child > *')].filter(cell => cell.offsetParent).length";
+    let shown =
+        "[...document.querySelectorAll('.trials tbody tr:first-child > *')].filter(cell => cell.offsetParent).length";
     let fits = "(() => { const box = document.querySelector('#trials .scroll'); return box.scrollWidth <= box.clientWidth + 1 })()";
 
     let plain = browser.open_without_scripts(&address).await;
