@@ -5,6 +5,7 @@
 //! the gait, explains bounds without a gait, and reads recordings. It does no learning, storage or HTTP.
 
 pub mod activation_alternations;
+mod angle_unit;
 pub mod body;
 mod cancel_token;
 pub mod certificate;
@@ -37,6 +38,7 @@ mod table;
 pub mod tuned_bounds;
 pub mod walking;
 
+pub use angle_unit::AngleUnit;
 pub use device::{Device, DeviceField};
 pub use gait::{DomainTrajectory, Gait};
 pub use gait_problem::margins::Margins;

@@ -31,6 +31,13 @@ pub fn grouped(number: &str) -> String {
     text + rest
 }
 
+/// The number with three significant digits, or as a whole number from 1000.
+pub fn three_digits(value: f64) -> f64 {
+    let whole = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    let last = 10_f64.powf(2.0 - whole.min(2.0));
+    (value * last).round() / last
+}
+
 /// Three significant digits, with an exponent if there would be many zeros.
 pub(crate) fn figure(value: f64) -> String {
     let magnitude = value.abs();

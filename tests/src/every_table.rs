@@ -51,7 +51,7 @@ pub async fn fill(database: &Path) {
         (format!("/api/v1/subjects/{}/consents", service.subject().await), json!({"form": "form 3"})),
         (
             format!("/api/v1/studies/{study}/raters/unblind"),
-            json!({"rater": "somebody not signed in", "reason": "asked"}),
+            json!({"rater": "an anonymous visitor", "reason": "asked"}),
         ),
         ("/api/v1/users".to_owned(), json!({"name": "R1", "role": "rater"})),
         ("/api/v1/tokens".to_owned(), json!({"name": "rig", "scopes": ["read"]})),

@@ -207,7 +207,7 @@ async fn log_rows_name_caller_object_and_subject() {
     }
     let refused = of(AccessKind::Refused, &csv);
     let who: BTreeSet<(&str, u16)> = refused.iter().map(|row| (row.actor.as_str(), row.status)).collect();
-    assert_eq!(who, BTreeSet::from([("somebody not signed in", 401), ("token [Rate]", 403)]), "{refused:?}");
+    assert_eq!(who, BTreeSet::from([("an anonymous visitor", 401), ("token [Rate]", 403)]), "{refused:?}");
     assert_eq!(of(AccessKind::Refused, "/sign-in").len(), 1);
     let hidden = of(AccessKind::Refused, &hidden);
     assert!(hidden.len() == 1 && hidden[0].status == 404 && hidden[0].subject_id == Some(subject), "{hidden:?}");

@@ -191,7 +191,7 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
     let pair = scene.one(done, "post /studies/{id}/blind-pairs/next", &next, json!({})).await;
     let say = format!("{api}/blind-pairs/{}/answer", text(&pair["pair"]["code"]));
     scene.one(done, "post /blind-pairs/{code}/answer", &say, json!({"answer": "first"})).await;
-    let unblind = json!({"rater": "somebody not signed in", "reason": "r"});
+    let unblind = json!({"rater": "an anonymous visitor", "reason": "r"});
     scene
         .one(done, "post /studies/{id}/raters/unblind", &format!("{api}/studies/{human}/raters/unblind"), unblind)
         .await;

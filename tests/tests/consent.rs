@@ -193,7 +193,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/trials/{}/certificate", trials[0].id), json!({})),
         (format!("/api/v1/trials/{}/explanation", trials[0].id), json!({})),
         (format!("/api/v1/trials/{}/execution-report", trials[0].id), json!({})),
-        (format!("/api/v1/studies/{human}/raters/unblind"), json!({"rater": "somebody not signed in", "reason": "r"})),
+        (format!("/api/v1/studies/{human}/raters/unblind"), json!({"rater": "an anonymous visitor", "reason": "r"})),
         (format!("/api/v1/preferences/{preference}/retract"), json!({"reason": "r"})),
         (format!("/api/v1/preferences/{preference}/undo"), json!({})),
     ] {

@@ -377,7 +377,12 @@ async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
     let (study, a, b) = finished(&service).await;
     let path = format!("/studies/{study}/compare");
     let page = service.fetch(&format!("{path}?a={a}&b={b}")).await;
-    for holds in [format!("href=\"/trials/{a}\""), format!("href=\"/trials/{b}\""), "gait A".into(), "gait B".into()] {
+    for holds in [
+        format!("href=\"/trials/{a}\""),
+        format!("href=\"/trials/{b}\""),
+        "First is better".into(),
+        "second: trial".into(),
+    ] {
         assert!(page.text.contains(&holds), "{holds}");
     }
     assert_eq!(page.text.matches("<svg class=\"chart\"").count(), 5, "the five human joint angles");
@@ -513,15 +518,15 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
     let subject = service.subject().await;
     let form = |changed: &str| {
         let given = format!("{changed}&");
-        let rest = ["number_of_trials=3", "seed=1", "tuned_a1=on", "values_a1=15,20", "tuned_a3=on"];
+        let rest = ["number_of_trials=3", "seed=1", "tuned_a1=on", "values_a1=859.4,1146", "tuned_a3=on"];
         let rest: Vec<&str> =
             rest.into_iter().filter(|field| !given.starts_with(field.split_once('=').unwrap().0)).collect();
         format!("{changed}&subject={subject}&muscles=on&answer_source=gait_rmse&parallel_trials=1&{}", rest.join("&"))
     };
     for (changed, field, said) in [
-        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be 0.05 to 50000"),
+        ("lengthscale_a1=-5", "lengthscale_a1", "\u{201c}Lengthscale of a1\u{201d} is -5; it must be "),
         ("lengthscale_a3=0", "lengthscale_a3", "\u{201c}Lengthscale of a3\u{201d} is 0; it must be 0.001 to 2000"),
-        ("values_a1=15,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
+        ("values_a1=859.4,x", "values_a1", "\u{201c}Values of a1\u{201d} is "),
         ("number_of_trials=many", "number_of_trials", "\u{201c}Number of trials\u{201d} is "),
         ("seed=x", "seed", "\u{201c}Seed\u{201d} is "),
         ("height_m=1.7", "height_m", "\u{201c}Height, m\u{201d} is "),
@@ -536,6 +541,68 @@ async fn refused_study_form_names_the_field_by_its_label_and_opens_it() {
         let folded = before.matches("<details").count() > before.matches("</details>").count();
         assert!(!folded || before.rsplit("<details").next().unwrap().split('>').next().unwrap().contains(" open"));
     }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn angles_of_bounds_are_degrees_on_pages_and_radians_in_rest() {
+    let (_folder, service) = service().await;
+    let form = service.fetch("/studies/new").await.text;
+    for shown in
+        ["torso lean, °", "value=\"0, 5.73, 11.46, 17.19, 22.92, 28.65\"", "value=\"859.4, 1146\"", "0 to 57.3°"]
+    {
+        assert!(form.contains(shown), "{shown}: {form}");
+    }
+    assert!(!form.contains("rad/s"), "{form}");
+    let subject = service.subject().await;
+    let bounds = "tuned_a6=on&values_a6=5.73;+0.2+rad,+17.19°&lengthscale_a6=5.73&fixed_a1=1146";
+    let body =
+        format!("subject={subject}&muscles=off&answer_source=gait_rmse&parallel_trials=1&number_of_trials=2&seed=1");
+    let study = made(&service.post_text("/studies/new", FORM, &format!("{body}&{bounds}")).await);
+    let plan = service.get(study).await.plan;
+    let tuned = &plan.search_space.dimensions()[0];
+    assert_eq!(
+        (tuned.values.as_slice(), tuned.lengthscale, plan.base_bounds.a1),
+        ([0.1, 0.2, 0.3].as_slice(), 0.1, 20.0)
+    );
+    let beyond = service.post_text("/studies/new", FORM, &format!("{body}&tuned_a6=on&values_a6=5,70")).await;
+    is_page(&beyond, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Values of a6\u{201d} is 70; it must be 0 to 57.3°.");
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trial = service.trials(study).await[0].clone();
+    let lean =
+        [(0.1, "5.73"), (0.2, "11.5"), (0.3, "17.2")].into_iter().find(|(rad, _)| *rad == trial.action.a6).unwrap().1;
+    for page in [format!("/studies/{study}"), format!("/trials/{}", trial.id)] {
+        let shown = service.fetch(&page).await.text;
+        assert!(shown.contains(&format!("<td class=\"number\">{lean}</td>")), "{page}: {shown}");
+        assert!(shown.contains("torso lean, °") && !shown.contains("torso lean, rad"), "{page}");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn comparison_of_studies_with_answers_of_people_leads_with_these_answers() {
+    let (_folder, service) = service().await;
+    let people = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
+    let other = service.study(|new| new.number_of_trials = 3).await;
+    for (study, state) in [(people, StudyState::Waiting), (other, StudyState::Finished)] {
+        service.wait_for(study, &[state]).await;
+    }
+    let path = format!("/studies/compare?a={people}&b={other}");
+    let before = service.fetch(&path).await.text;
+    assert!(before.contains("no gait is recommended yet") && before.contains("Gait RMSE answers every comparison"));
+    let trials = service.trials(people).await;
+    let (new, old) = (trials[trials.len() - 1].id, trials[trials.len() - 2].id);
+    for author in ["K", "L"] {
+        let body = json!({"trial_a": new, "trial_b": old, "answer": "a", "author": author});
+        let given = service.post(&format!("/api/v1/studies/{people}/preferences"), &body).await;
+        assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
+    }
+    let after = service.fetch(&path).await.text;
+    let place = |text: &str| after.find(text).unwrap_or_else(|| panic!("{text}: {after}"));
+    assert!(place("about this gait") < place(": utility of the recommended gait</h3>"));
+    assert!(place(": utility of the recommended gait</h3>") < place("Gait RMSE of the best action by iteration</h3>"));
+    let same = service.fetch(&format!("/studies/compare?a={people}&b={people}")).await;
+    is_page(&same, StatusCode::OK, "Study A and study B are the same. Choose two different studies.");
     service.stop().await;
 }
 

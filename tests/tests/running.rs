@@ -317,6 +317,57 @@ async fn study_page_with_300_trials_weighs_less_than_150_kb() {
 }
 
 #[tokio::test]
+async fn pages_of_the_trials_table_neither_repeat_nor_miss_a_trial_while_the_study_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("a.db");
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let study = service.study(|new| new.number_of_trials = 3).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    service.stop().await;
+    large::fill_to(&database, study, 120).await;
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let numbers = |page: &str| -> Vec<u32> {
+        let rows = page.split("<th scope=\"row\" class=\"number\">").skip(1);
+        rows.map(|row| row.split(['>', '<']).nth(2).unwrap().parse().unwrap()).collect()
+    };
+    let link = |page: &str, text: &str| {
+        let found = page.split("<a href=\"").find(|link| link.contains(&format!(">{text}<"))).map(str::to_owned);
+        let query = found.and_then(|link| link.split("#trials").next().map(str::to_owned));
+        query.map(|query| format!("/studies/{study}{}", query.replace("&amp;", "&").replace("&#38;", "&")))
+    };
+    for order in ["descending", "ascending"] {
+        let filter = format!("/studies/{study}?sort=seconds_total&order={order}&state=converged");
+        let first = service.fetch(&filter).await.text;
+        assert!(numbers(&first).len() <= 50 && link(&first, "Previous page").is_none());
+        let mut pages = vec![numbers(&first)];
+        let mut page = first.clone();
+        while let Some(next) = link(&page, "Next page") {
+            page = service.fetch(&next).await.text;
+            pages.push(numbers(&page));
+        }
+        let mut all = pages.concat();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), pages.concat().len(), "{order}: {pages:?}");
+        // The way back shows the same pages.
+        for expected in pages.iter().rev().skip(1) {
+            page = service.fetch(&link(&page, "Previous page").unwrap()).await.text;
+            assert_eq!(&numbers(&page), expected, "{order}");
+        }
+    }
+    // Newer trials come first, and move the others on.
+    let first = service.fetch(&format!("/studies/{study}")).await.text;
+    let next = link(&first, "Next page").unwrap();
+    let extended = service.post(&format!("/api/v1/studies/{study}/extend"), &json!({"number_of_trials": 123})).await;
+    assert!(extended.status.is_success(), "{}", extended.text);
+    service.wait_for_trials(study, 123).await;
+    assert_eq!(numbers(&service.fetch(&next).await.text), (21..=70).rev().collect::<Vec<u32>>());
+    let other = next.replace("descending", "ascending");
+    assert_eq!(service.fetch(&other).await.status, StatusCode::UNPROCESSABLE_ENTITY, "a cursor belongs to its list");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn study_form_is_checked_while_another_change_holds_the_writer() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;

@@ -115,18 +115,24 @@ function addControls(title) {
   const zoom = document.createElement("details");
   zoom.className = "zoom";
   zoom.innerHTML = `<summary>Zoom</summary><form>
-    <label>from <input name="from" type="number" min="0" max="${100 - LEAST}" step="any" value="0" required></label>
-    <label>to <input name="to" type="number" min="${LEAST}" max="100" step="any" value="100" required> %</label>
+    <label>from <input name="from" type="number" min="0" max="100" step="any" value="0" required></label>
+    <label>to <input name="to" type="number" min="0" max="100" step="any" value="100" required> %</label>
     <button class="button quiet">Show</button> <span class="hint">or drag across a chart</span></form>`;
   zoom.querySelector("summary")?.setAttribute("aria-label", `Zoom: ${name}`);
   const form = /** @type {HTMLFormElement} */ (zoom.querySelector("form"));
   const [from, to] = /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll("input")]);
-  const check = () => to.setCustomValidity(Number(to.value) - Number(from.value) < LEAST ? `The end must be at least ${LEAST} % after the start.` : "");
+  // Ends in the other order are swapped.
+  const check = () => to.setCustomValidity(Math.abs(Number(to.value) - Number(from.value)) < LEAST ? `The part must be at least ${LEAST} % of the cycle.` : "");
   form.addEventListener("input", check);
   form.addEventListener("submit", (event) => {
     event.preventDefault();
+    // A browser does not check what a script filled in.
+    const ends = /** @type {Part} */ ([Number(from.value), Number(to.value)].sort((a, b) => a - b));
+    [from.value, to.value] = ends.map(String);
+    check();
+    if (!form.reportValidity()) return;
     zoom.open = false;
-    showPart([Number(from.value), Number(to.value)]);
+    showPart(ends);
     reset.focus();
   });
   zoom.addEventListener("toggle", () => {

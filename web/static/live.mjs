@@ -152,7 +152,8 @@ if (live) {
     for (const [name, value] of new FormData(filter)) {
       if (name !== "sort" && name !== "order") query.set(name, String(value));
     }
-    query.delete("page");
+    query.delete("after");
+    query.delete("before");
     list(`?${query}`);
   };
   filter?.addEventListener("input", filtered);

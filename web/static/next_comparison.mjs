@@ -1,5 +1,5 @@
 // @ts-check
-// After an answer: reloads the page when the study changes, to show the next comparison. If the user is typing, it offers a link
+// Reloads the page when the study changes or a gait is certified, to show the next comparison. If the user is typing, it offers a link
 // instead. It never reloads while an answer can still be undone, or while a form is being sent.
 
 import { holdsEdits } from "./edited_fields.mjs";
@@ -11,7 +11,7 @@ if (place) {
   const source = new EventSource(`/api/v1/studies/${place.dataset.study}/events?after=${place.dataset.after}`);
   let leaving = false;
   document.addEventListener("submit", () => (leaving = true));
-  source.addEventListener("study_changed", async () => {
+  const update = async () => {
     await over;
     if (leaving) return;
     if (!holdsEdits(document.body)) {
@@ -22,5 +22,8 @@ if (place) {
     link.href = location.href;
     link.textContent = "Reload this page";
     place.replaceChildren("The next comparison may be ready. ", link, "; what you typed here will be lost.");
-  });
+  };
+  source.addEventListener("study_changed", update);
+  // After an answer the study changes with the next comparison; before the first one, each certificate changes what the page says.
+  if (!place.closest(".notice.good")) source.addEventListener("gait_certified", update);
 }

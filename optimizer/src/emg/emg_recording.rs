@@ -2,7 +2,7 @@
 
 use crate::model_error::ModelError;
 use crate::opensim_reading::StorageFile;
-use crate::reference::{contacts, given};
+use crate::reference::{SHORTEST_CONTACT_S, SHORTEST_SWING_S, contacts, given};
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Allowed sampling rates of a file without a time column, Hz.
@@ -116,7 +116,10 @@ impl EmgRecording {
                 0 => "no heel strike",
                 _ => "only one heel strike",
             };
-            let reason = format!("column {column:?} has {found} (a rise above {threshold}); a stride needs two");
+            let reason = format!(
+                "column {column:?} has {found} (a rise above {threshold} for at least {SHORTEST_CONTACT_S} s, after at least \
+                 {SHORTEST_SWING_S} s below it); a stride needs two"
+            );
             return Err(ModelError::Malformed { what: what.to_owned(), reason });
         }
         Ok(strikes)

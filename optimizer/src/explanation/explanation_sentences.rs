@@ -2,6 +2,7 @@
 
 use super::given_bound::BoundValue;
 use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
+use crate::angle_unit::AngleUnit;
 use crate::number_format::{figure, with_unit};
 use crate::solve::{SolveStatus, Violation};
 use crate::tuned_bounds::TunedBounds;
@@ -22,8 +23,12 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
 }
 
 /// A bound with its value: `a7 = 5° (hip angle)`.
-pub fn quantity(bound: &str, value: f64) -> String {
-    format!("{bound} = {} ({})", TunedBounds::in_unit(bound, value), TunedBounds::quantity_of(bound))
+pub fn quantity(bound: &str, value: f64, angles: AngleUnit) -> String {
+    format!("{bound} = {} ({})", in_unit(bound, value, angles), TunedBounds::quantity_of(bound))
+}
+
+fn in_unit(bound: &str, value: f64, angles: AngleUnit) -> String {
+    angles.in_words(value, TunedBounds::unit_of(bound))
 }
 
 /// A list: `a, b and c`.
@@ -45,12 +50,17 @@ impl Violation {
     pub fn amount_in_words(&self) -> String {
         with_unit(figure(self.amount), &self.unit)
     }
+
+    fn amount_in(&self, angles: AngleUnit) -> String {
+        let is_shown_as_stored = angles.of(&self.unit) == self.unit;
+        if is_shown_as_stored { self.amount_in_words() } else { angles.in_words(self.amount, &self.unit) }
+    }
 }
 
 impl BoundAtLimit {
     /// The domains in which the bound is reached, as a sentence.
-    pub fn in_words(&self) -> String {
-        let quantity = quantity(&self.bound, self.value);
+    pub fn in_words(&self, angles: AngleUnit) -> String {
+        let quantity = quantity(&self.bound, self.value, angles);
         if self.domains.len() == CYCLE.len() {
             return format!("{quantity} is reached in every domain.");
         }
@@ -79,8 +89,8 @@ fn caveat(undecided: bool) -> &'static str {
 
 impl Conflict {
     /// The conflicting bounds and the violated constraint, as sentences.
-    pub fn in_words(&self) -> String {
-        let quantities: Vec<String> = self.bounds.iter().map(BoundValue::in_words).collect();
+    pub fn in_words(&self, angles: AngleUnit) -> String {
+        let quantities: Vec<String> = self.bounds.iter().map(|one| one.in_words(angles)).collect();
         let without = match self.without.len() {
             0 => String::new(),
             1 => format!("With {} at its loosest value, another conflict remains. ", list(&self.without)),
@@ -118,7 +128,8 @@ impl Conflict {
             ),
         };
         let missed = self.violations.first().map_or(String::new(), |worst| {
-            format!("; the nearest motion violates the limit of {} by {}", worst.constraint(), worst.amount_in_words())
+            let amount = worst.amount_in(angles);
+            format!("; the nearest motion violates the limit of {} by {amount}", worst.constraint())
         });
         let (from, caveat) = (from_starts(self.starts), caveat(self.undecided));
         format!("{without}{claim}{tried}, no gait was found{from}{caveat}{missed}.{relief}")
@@ -127,17 +138,17 @@ impl Conflict {
 
 impl BoundValue {
     /// `a7 = 5° (hip angle)`.
-    fn in_words(&self) -> String {
-        quantity(&self.bound, self.value)
+    fn in_words(&self, angles: AngleUnit) -> String {
+        quantity(&self.bound, self.value, angles)
     }
 }
 
 impl Relaxation {
     /// The effect of the relaxation, as a sentence.
-    pub fn in_words(&self) -> String {
+    pub fn in_words(&self, angles: AngleUnit) -> String {
         let Self { bound, from, to, not_with, .. } = self;
         let limited = TunedBounds::quantity_of(bound);
-        let in_unit = |value: f64| TunedBounds::in_unit(bound, value);
+        let in_unit = |value: f64| in_unit(bound, value, angles);
         let (loosest, tried) = (in_unit(*not_with), in_unit(*from));
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         if let Some(to) = to {
@@ -157,11 +168,11 @@ impl Relaxation {
 
 impl JointRelaxation {
     /// The effect of the relaxation, as a sentence.
-    pub fn in_words(&self) -> String {
+    pub fn in_words(&self, angles: AngleUnit) -> String {
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         let named =
             |value: &dyn Fn(&super::RelaxedBound) -> String| list(&self.bounds.iter().map(value).collect::<Vec<_>>());
-        let not_with = named(&|one| format!("{} = {}", one.bound, TunedBounds::in_unit(&one.bound, one.not_with)));
+        let not_with = named(&|one| format!("{} = {}", one.bound, in_unit(&one.bound, one.not_with, angles)));
         if self.bounds.iter().any(|one| one.to.is_none()) {
             return format!(
                 "Relaxing these bounds together is not sufficient: even at their loosest values, {not_with}, no gait was \
@@ -170,8 +181,8 @@ impl JointRelaxation {
         }
         let with = named(&|one| {
             let to = one.to.unwrap_or(one.not_with);
-            let from = TunedBounds::in_unit(&one.bound, one.from);
-            format!("{} instead of {from}", quantity(&one.bound, to))
+            let from = in_unit(&one.bound, one.from, angles);
+            format!("{} instead of {from}", quantity(&one.bound, to, angles))
         });
         format!(
             "Relaxing these bounds together, to {with}, gives a gait; with {not_with}, no gait was found{starts}{caveat}."
@@ -181,9 +192,9 @@ impl JointRelaxation {
 
 impl BoundValue {
     /// The limit in words: `a hip angle of at most 15°`.
-    fn limit_in_words(&self) -> String {
+    fn limit_in_words(&self, angles: AngleUnit) -> String {
         let limited = TunedBounds::quantity_of(&self.bound);
-        let value = TunedBounds::in_unit(&self.bound, self.value);
+        let value = in_unit(&self.bound, self.value, angles);
         let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
         let quantity = limited.strip_prefix("minimum ").or_else(|| limited.strip_prefix("maximum "));
         let quantity = quantity.unwrap_or(limited);
@@ -194,12 +205,12 @@ impl BoundValue {
 
 impl Explanation {
     /// The first conflict in one sentence, without details of the search; `None` if no conflict is known.
-    pub fn headline(&self) -> Option<String> {
+    pub fn headline(&self, angles: AngleUnit) -> Option<String> {
         if self.gait_found {
             return Some("The bounds of this trial do not conflict: the solve missed a gait.".to_owned());
         }
         let conflict = self.conflicts.first()?;
-        let limits: Vec<String> = conflict.bounds.iter().map(BoundValue::limit_in_words).collect();
+        let limits: Vec<String> = conflict.bounds.iter().map(|one| one.limit_in_words(angles)).collect();
         Some(match limits.as_slice() {
             [] => {
                 "No gait was found even with every bound at its loosest value: fixed constraints conflict.".to_owned()
@@ -218,22 +229,22 @@ impl Explanation {
     }
 
     /// The conflicts as sentences, the first one first. If they are unknown, the largest violation.
-    pub fn conflicts_in_words(&self) -> Vec<String> {
+    pub fn conflicts_in_words(&self, angles: AngleUnit) -> Vec<String> {
         if self.gait_found {
             let found = "The search for a conflict found a gait with exactly these bounds. They do not conflict; the solve missed \
                          this gait.";
             return vec![found.to_owned()];
         }
         if self.conflicts.is_empty() {
-            return self.missed_most().into_iter().collect();
+            return self.missed_most(angles).into_iter().collect();
         }
-        self.conflicts.iter().map(Conflict::in_words).collect()
+        self.conflicts.iter().map(|one| one.in_words(angles)).collect()
     }
 
     /// The largest violation, as a sentence; `None` if there is none.
-    fn missed_most(&self) -> Option<String> {
+    fn missed_most(&self, angles: AngleUnit) -> Option<String> {
         let worst = self.violations.first()?;
-        Some(format!("Largest violation: {}, by {}.", worst.row, worst.amount_in_words()))
+        Some(format!("Largest violation: {}, by {}.", worst.row, worst.amount_in(angles)))
     }
 
     /// The smallest relaxation of one bound that gives a gait.
@@ -242,11 +253,11 @@ impl Explanation {
     }
 
     /// The relaxations as sentences: single ones, joint ones, and those that are not sufficient.
-    pub fn remedies_in_words(&self) -> Vec<String> {
+    pub fn remedies_in_words(&self, angles: AngleUnit) -> Vec<String> {
         let helps = |joint: &&JointRelaxation| joint.bounds.iter().all(|one| one.to.is_some());
-        let alone = self.relaxations.iter().map(Relaxation::in_words);
-        let together = self.together.iter().filter(helps).map(JointRelaxation::in_words);
-        let in_vain = self.together.iter().filter(|joint| !helps(joint)).map(JointRelaxation::in_words);
+        let alone = self.relaxations.iter().map(|one| one.in_words(angles));
+        let together = self.together.iter().filter(helps).map(|one| one.in_words(angles));
+        let in_vain = self.together.iter().filter(|joint| !helps(joint)).map(|one| one.in_words(angles));
         alone.chain(together).chain(in_vain).collect()
     }
 
@@ -257,13 +268,20 @@ impl Explanation {
         )
     }
 
-    /// The explanation as sentences.
+    /// The explanation as sentences, with angles in radians.
     pub fn sentences(&self) -> Vec<String> {
+        let angles = AngleUnit::Radian;
         let status = status_in_words(self.status).map(str::to_owned);
-        let at_limit = self.at_limit.iter().map(BoundAtLimit::in_words);
-        let conflicts = self.conflicts_in_words().into_iter();
+        let at_limit = self.at_limit.iter().map(|at| at.in_words(angles));
+        let conflicts = self.conflicts_in_words(angles).into_iter();
         let stopped = self.stopped_in_words().map(str::to_owned);
-        status.into_iter().chain(stopped).chain(conflicts).chain(self.remedies_in_words()).chain(at_limit).collect()
+        status
+            .into_iter()
+            .chain(stopped)
+            .chain(conflicts)
+            .chain(self.remedies_in_words(angles))
+            .chain(at_limit)
+            .collect()
     }
 }
 

@@ -40,10 +40,13 @@ impl UnchangedBound {
         self.least.is_none_or(|least| least <= value) && self.most.is_none_or(|most| value <= most)
     }
 
-    /// Whether the bound, which has this value, is active: small changes of it change the gait. At an end of the range of the
-    /// bound, one end of the interval is open.
+    /// Whether the bound, which has this value, is active: the gait changes with small changes of it, or when it is loosened. A
+    /// bound below the tolerance of its limit is loosened only beyond that tolerance. At an end of the range of the bound, one end
+    /// of the interval is open.
     pub fn is_active(&self, value: f64) -> bool {
-        [self.least, self.most].contains(&Some(value))
+        let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
+        let loosest = if is_lower { self.least } else { self.most };
+        loosest.is_some() || [self.least, self.most].contains(&Some(value))
     }
 }
 

@@ -1,20 +1,24 @@
 //! Sensitivities as sentences.
 
 use super::{BoundSensitivity, GaitSensitivities};
+use crate::angle_unit::AngleUnit;
 use crate::number_format::figure;
 use crate::tuned_bounds::TunedBounds;
 
-/// For each bound: a change that a person would make, its unit in the sentence, and the change in units of the bound.
-const CHANGES: [(&str, f64); TunedBounds::COUNT] = [
-    ("1 rad/s", 1.0),
-    ("1 rad/s²", 1.0),
-    ("0.01 m/s", 0.01),
-    ("0.01 m/s", 0.01),
-    ("1 mm", 0.001),
-    ("0.01 rad", 0.01),
-    ("1°", 1.0),
-    ("1°", 1.0),
-];
+/// A change of a bound that a person would make, in words and in units of the bound.
+fn change_of(bound: usize, angles: AngleUnit) -> (&'static str, f64) {
+    match (TunedBounds::UNITS[bound], angles) {
+        ("rad/s", AngleUnit::Radian) => ("1 rad/s", 1.0),
+        ("rad/s", AngleUnit::Degree) => ("10 °/s", 10_f64.to_radians()),
+        ("rad/s²", AngleUnit::Radian) => ("1 rad/s²", 1.0),
+        ("rad/s²", AngleUnit::Degree) => ("10 °/s²", 10_f64.to_radians()),
+        ("m/s", _) => ("0.01 m/s", 0.01),
+        ("m", _) => ("1 mm", 0.001),
+        ("rad", AngleUnit::Radian) => ("0.01 rad", 0.01),
+        ("rad", AngleUnit::Degree) => ("1°", 1_f64.to_radians()),
+        _ => ("1°", 1.0),
+    }
+}
 /// Number of places that a sentence names.
 const PLACES: usize = 3;
 /// An interval without ends.
@@ -22,10 +26,10 @@ const ANY_VALUE: &str = "any value";
 
 impl GaitSensitivities {
     /// One sentence for each bound that matters, and one for the others.
-    pub fn sentences(&self) -> Vec<String> {
+    pub fn sentences(&self, angles: AngleUnit) -> Vec<String> {
         let matters = |bound: &&BoundSensitivity| !bound.active.is_empty();
         let mut sentences: Vec<String> =
-            self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport)).collect();
+            self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport, angles)).collect();
         let others: Vec<&str> = self.bounds.iter().filter(|bound| !matters(bound)).map(|bound| bound.bound).collect();
         if !others.is_empty() {
             sentences.push(format!("Small changes in {} have no effect.", others.join(", ")));
@@ -36,12 +40,12 @@ impl GaitSensitivities {
 
 impl BoundSensitivity {
     /// The values with the same active constraints, as far as the bound can have them: `0.1 to 0.2`, `0.1 or more`.
-    pub fn interval_in_words(&self, number: fn(f64) -> String) -> String {
+    pub fn interval_in_words(&self, number: impl Fn(f64) -> String) -> String {
         let range = TunedBounds::NAMES.iter().zip(TunedBounds::RANGES).find(|(name, _)| **name == self.bound);
         let (lowest, highest) = range.map_or((f64::NEG_INFINITY, f64::INFINITY), |(_, range)| range);
         let (least, most) = self.interval;
-        let least = least.filter(|least| *least > lowest).map(number);
-        let most = most.filter(|most| *most < highest).map(number);
+        let least = least.filter(|least| *least > lowest).map(&number);
+        let most = most.filter(|most| *most < highest).map(&number);
         match (least, most) {
             (None, None) => ANY_VALUE.to_owned(),
             (Some(least), None) => format!("{least} or more"),
@@ -51,9 +55,9 @@ impl BoundSensitivity {
         }
     }
 
-    fn sentence(&self, cost_of_transport: f64) -> String {
+    fn sentence(&self, cost_of_transport: f64, angles: AngleUnit) -> String {
         let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound).unwrap_or(0);
-        let (change, by) = CHANGES[place];
+        let (change, by) = change_of(place, angles);
         // A lower bound is stricter the larger it is.
         let (stricter, by) = if TunedBounds::IS_LOWER[place] { ("more", by) } else { ("less", -by) };
         let derivatives = &self.derivatives;
@@ -69,7 +73,8 @@ impl BoundSensitivity {
         } else {
             ""
         };
-        let values = match self.interval_in_words(figure).as_str() {
+        let number = |value: f64| figure(angles.shown(value, TunedBounds::UNITS[place]));
+        let values = match self.interval_in_words(number).as_str() {
             ANY_VALUE => ANY_VALUE.to_owned(),
             values => format!("values of {values}"),
         };
@@ -115,8 +120,13 @@ mod tests {
             // Beyond the range of the bound there is no limit.
             ((Some(-1.0), Some(100.0)), "for any value."),
         ] {
-            let sentence = of(interval).sentence(1.0);
+            let sentence = of(interval).sentence(1.0, AngleUnit::Radian);
             assert!(sentence.ends_with(&format!("The same constraints stay active {values}")), "{sentence}");
         }
+        let in_degrees = of((Some(0.25), None)).sentence(1.0, AngleUnit::Degree);
+        assert!(
+            in_degrees.starts_with("a6 (torso lean): 1° less") && in_degrees.ends_with("14.3 or more."),
+            "{in_degrees}"
+        );
     }
 }

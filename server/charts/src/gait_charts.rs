@@ -11,13 +11,14 @@ mod limit_cycles;
 mod muscle_states;
 mod solve_charts;
 
+pub use drawn_gait::drawn;
 pub use group::Group;
 pub use joint_angles::{of_reference, with_reference};
 pub use limit_cycles::{limit_cycle, limit_cycles};
 pub use solve_charts::solve;
 
 use crate::{Animation, Chart, Figure, GaitWalker, Stroke};
-use drawn_gait::{STRIDE, drawn};
+use drawn_gait::STRIDE;
 use gait_optimizer::gait::stick_figure::StickFigure;
 use gait_optimizer::gait::{PhaseProgress, progress};
 use gait_optimizer::{Gait, ModelError, ReferenceGait};

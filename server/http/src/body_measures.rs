@@ -1,5 +1,6 @@
 //! Height and body mass as people type them, in metres and kilograms or in feet, inches and pounds.
 
+use gait_optimizer::number_format::three_digits;
 use gaitwright_service::error::Error;
 use std::str::FromStr;
 
@@ -47,13 +48,12 @@ pub(crate) fn likely_mass_kg(number: f64) -> Option<f64> {
     likely(number, (35.0, 160.0), [1.0, KILOGRAMS_PER_POUND, 0.001])
 }
 
-/// The number in the only unit in which it is within the range, with three significant digits. `None` also if it is within
+/// The number in the only unit in which it is within the range, with three significant digits or as a whole number. `None` also if it is within
 /// the range in several units, because then nobody can know what was meant.
 pub(crate) fn likely<const N: usize>(number: f64, (low, high): (f64, f64), units: [f64; N]) -> Option<f64> {
     let mut fitting = units.into_iter().map(|unit| number * unit).filter(|value| (low..=high).contains(value));
     let (Some(found), None) = (fitting.next(), fitting.next()) else { return None };
-    let digits = 10_f64.powf(2.0 - found.abs().log10().floor());
-    Some((found * digits).round() / digits).filter(|value| (low..=high).contains(value))
+    Some(three_digits(found)).filter(|value| (low..=high).contains(value))
 }
 
 /// Rounds values of other units only: a number as typed has its digits already.

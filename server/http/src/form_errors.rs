@@ -1,6 +1,7 @@
 //! Refused form fields, in the words of the form, with what was probably meant where that can be known.
 
 use crate::body_measures::{likely, likely_height_m, likely_mass_kg};
+use crate::bound_units;
 use gait_optimizer::TunedBounds;
 use gait_optimizer::number_format::with_unit;
 use gaitwright_service::error::{Error, FieldError};
@@ -89,13 +90,12 @@ fn near_miss(fault: &FieldError) -> Option<String> {
     }
     let bound = field.rsplit('_').next().unwrap_or_default();
     let place = TunedBounds::place_of(bound)?;
-    let unit = TunedBounds::unit_of(bound);
+    let unit = bound_units::unit(bound);
     let (low, high) = TunedBounds::RANGES[place];
-    let radian = 1_f64.to_degrees();
+    let range = (bound_units::shown(bound, low), bound_units::shown(bound, high));
     let meant = match unit {
-        "m" => likely(number, (low, high), [1.0, 0.01, 0.001]),
-        "rad" => likely(number, (low, high), [1.0, 1.0 / radian]),
-        "°" => likely(number, (low, high), [1.0, radian]),
+        "m" => likely(number, range, [1.0, 0.01, 0.001]),
+        "°" | "°/s" | "°/s²" => likely(number, range, [1.0, 1_f64.to_degrees()]),
         _ => None,
     }?;
     Some(with_unit(meant, unit))
@@ -147,7 +147,8 @@ mod tests {
             (FieldError::new("subject.body_mass_kg", 250.0, "35 to 160"), Some("113 kg")),
             (FieldError::new("values_a5", 50.0, "0 to 0.3"), Some("0.05 m")),
             (FieldError::new("values_a5", 20.0, "0 to 0.3"), None),
-            (FieldError::new("fixed_a6", 20.0, "0 to 1"), Some("0.349 rad")),
+            (FieldError::new("fixed_a6", 70.0, "0 to 57.3°"), None),
+            (FieldError::new("values_a1", "20", "57.3 to 5730 °/s"), Some("1146 °/s")),
             (FieldError::new("fixed_a7", 0.35, "5 to 68"), Some("20.1°")),
             (FieldError::new("height_m", 0.1, "1.4 to 2.2"), None),
             (FieldError::new("height_m", "tall", "a number"), None),

@@ -1,8 +1,7 @@
 //! Numbers and names as pages show them.
 
 use gait_learner::Prediction;
-use gait_optimizer::TunedBounds;
-use gait_optimizer::number_format::grouped;
+use gait_optimizer::number_format::{grouped, three_digits};
 use gaitwright_charts::power_of_ten;
 use gaitwright_service::access::Role;
 use gaitwright_store::blind_pairs::OrderedAnswer;
@@ -39,7 +38,7 @@ pub(crate) fn duration(seconds: f64) -> String {
 pub(crate) fn number(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 || (1e-3..1e5).contains(&magnitude) {
-        return minus(&grouped(&significant(value)));
+        return minus(&grouped(&three_digits(value).to_string()));
     }
     let text = format!("{value:.2e}");
     match text.split_once('e') {
@@ -48,16 +47,14 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// At most three digits, without trailing zeros.
-fn significant(value: f64) -> String {
-    let whole = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
-    let last = 10_f64.powf(2.0 - whole.min(2.0));
-    ((value * last).round() / last).to_string()
-}
-
 /// With a minus sign that is as wide as a plus sign.
 fn minus(text: &str) -> String {
     text.replace('-', "\u{2212}")
+}
+
+/// Every digit of a number.
+pub(crate) fn exactly(value: f64) -> String {
+    minus(&grouped(&value.to_string()))
 }
 
 /// The version of the program.
@@ -189,55 +186,9 @@ pub(crate) fn utility(utility: &Prediction) -> String {
     format!("{} ± {:.2}", signed(utility.mean), utility.standard_deviation)
 }
 
-/// What a bound limits, with its unit; empty for any other name.
-pub(crate) fn meaning(name: &str) -> &'static str {
-    TunedBounds::place_of(name).map_or("", |place| TunedBounds::MEANINGS[place])
-}
-
-/// A bound in words, with angles in degrees: `Torso lean at most 17.2° (0.3 rad)`.
-pub(crate) fn limit_in_words(name: &str, value: f64) -> String {
-    let place = TunedBounds::place_of(name);
-    let limited = TunedBounds::quantity_of(name);
-    let limited = limited.strip_prefix("minimum ").or_else(|| limited.strip_prefix("maximum ")).unwrap_or(limited);
-    let side = if place.is_some_and(|place| TunedBounds::IS_LOWER[place]) { "at least" } else { "at most" };
-    let stored = TunedBounds::in_unit(name, value);
-    let shown = match TunedBounds::unit_of(name).strip_prefix("rad") {
-        Some("") => format!("{}° ({stored})", number(value.to_degrees())),
-        Some(per) => format!("{} °{per} ({stored})", number(value.to_degrees())),
-        None => stored,
-    };
-    let mut letters = limited.chars();
-    let first = letters.next().map(|letter| letter.to_uppercase().to_string()).unwrap_or_default();
-    format!("{first}{} {side} {shown}", letters.as_str())
-}
-
-/// One bound: name, value, what it limits.
-pub(crate) struct Bound {
-    pub(crate) name: &'static str,
-    pub(crate) value: String,
-    pub(crate) meaning: &'static str,
-}
-
-/// The bounds of an action.
-pub(crate) fn bounds(action: &TunedBounds) -> Vec<Bound> {
-    TunedBounds::NAMES
-        .iter()
-        .zip(action.to_array())
-        .zip(TunedBounds::MEANINGS)
-        .map(|((name, value), meaning)| Bound { name, value: value.to_string(), meaning })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn bounds_in_words_say_which_side_they_limit_and_have_angles_in_degrees() {
-        assert_eq!(limit_in_words("a3", 0.3), "Hip velocity at least 0.3 m/s");
-        assert_eq!(limit_in_words("a6", 0.3), "Torso lean at most 17.2° (0.3 rad)");
-        assert_eq!(limit_in_words("a8", 30.0), "Ankle angle at most 30°");
-    }
 
     #[test]
     fn numbers_have_three_digits_without_trailing_zeros() {

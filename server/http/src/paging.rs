@@ -119,10 +119,11 @@ impl<K: Serialize, F> Paging<K, F> {
 
 /// Identifies a list: its path, filters and order. Every cursor begins with it, because its key has a meaning only there.
 #[derive(Debug, PartialEq, Eq)]
-struct ListFingerprint([u8; 8]);
+pub(crate) struct ListFingerprint([u8; 8]);
 
 impl ListFingerprint {
-    fn of(path: &str, filter: &Pairs) -> Self {
+    /// A list with its filter and order.
+    pub(crate) fn of(path: &str, filter: &Pairs) -> Self {
         let mut sorted: Vec<&(String, String)> = filter.iter().collect();
         sorted.sort_unstable();
         let hash = Sha256::digest(format!("{path} {sorted:?}"));
@@ -132,13 +133,13 @@ impl ListFingerprint {
     }
 
     /// The text of a cursor: opaque, so that nobody builds one.
-    fn cursor<K: Serialize>(&self, key: &K) -> Result<String, Error> {
+    pub(crate) fn cursor<K: Serialize>(&self, key: &K) -> Result<String, Error> {
         let key = serde_json::to_vec(key).map_err(|e| Error::Internal(e.to_string()))?;
         Ok(hex::encode([&self.0[..], &key].concat()))
     }
 
     /// The key in a cursor of this list.
-    fn key<K: DeserializeOwned>(&self, cursor: &str) -> Result<K, Error> {
+    pub(crate) fn key<K: DeserializeOwned>(&self, cursor: &str) -> Result<K, Error> {
         let invalid = || Error::invalid("cursor", cursor, "the value of `next` from the previous page");
         let bytes = hex::decode(cursor).map_err(|_| invalid())?;
         let (list, key) = bytes.split_first_chunk().ok_or_else(invalid)?;

@@ -38,7 +38,7 @@ impl Actor {
 
     /// A caller who is not signed in.
     pub fn anonymous() -> Self {
-        Self::named("somebody not signed in")
+        Self::named("an anonymous visitor")
     }
 
     /// An actor with this text.

@@ -40,10 +40,12 @@ pub struct Listing {
 /// Where a page of a listing begins.
 #[derive(Debug, Clone)]
 pub enum Start {
-    /// After this number of trials. While trials change state, the next page can repeat or miss some.
-    Skip(u32),
+    /// With the first trial.
+    First,
     /// After a trial that had this place, whatever became of it since.
     After(TrialPlace),
+    /// So that it ends before a trial that had this place.
+    Before(TrialPlace),
 }
 
 /// The place of a trial in the order of a listing: its value in the sorted column, then its number.
@@ -86,6 +88,8 @@ pub struct ListedTrial {
     pub message: String,
     /// Number of trials that match the filter.
     pub matching: u32,
+    /// How many of them come before this one.
+    pub before: u32,
     /// Its place in the order of the listing.
     pub place: TrialPlace,
 }
@@ -95,12 +99,13 @@ pub struct ListedTrial {
 /// # Errors
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<ListedTrial>> {
-    let (skip, after) = match &listing.start {
-        Start::Skip(skip) => (*skip, None),
-        Start::After(place) => (0, Some(place)),
+    let (is_before, place) = match &listing.start {
+        Start::First => (false, None),
+        Start::After(place) => (false, Some(place)),
+        Start::Before(place) => (true, Some(place)),
     };
     let query = sqlx::query(
-        "with listed as (select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
+        "with keyed as (select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \
          t.cost_of_transport, t.iterations, t.seconds_total, t.message, (select w.number from trials w where w.id = t.warm_started_from) as from_number, \
          count(*) over () as matching, \
          case ?2 when 'number' then t.number when 'state' then t.state \
@@ -110,11 +115,16 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
              when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
          from trials t \
          where t.study_id = ?1 and (?4 is null or t.state = ?4) \
-             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0)) \
-         select * from listed where ?8 is null or (key is ?9 and number < ?8) \
-             or (?9 is not null and (key is null or case when ?3 then key < ?9 else key > ?9 end)) \
-         order by key is null, case when ?3 then key end desc, case when ?3 then null else key end, number desc \
-         limit ?6 offset ?7",
+             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0)), \
+         listed as (select *, row_number() over (order by key is null, case when ?3 then key end desc, \
+             case when ?3 then null else key end, number desc) - 1 as before from keyed) \
+         select * from listed where ?8 is null \
+             or case when ?7 then (key is ?9 and number > ?8) \
+                 or (key is not null and (?9 is null or case when ?3 then key > ?9 else key < ?9 end)) \
+             else (key is ?9 and number < ?8) \
+                 or (?9 is not null and (key is null or case when ?3 then key < ?9 else key > ?9 end)) end \
+         order by case when ?7 then -before else before end \
+         limit ?6",
     )
     .bind(study)
     .bind(listing.sort)
@@ -122,15 +132,18 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
     .bind(listing.state.map(TrialState::as_str))
     .bind(&listing.contains)
     .bind(listing.limit)
-    .bind(skip)
-    .bind(after.map(|place| place.1));
-    let query = match after.map(|place| &place.0) {
+    .bind(is_before)
+    .bind(place.map(|place| place.1));
+    let query = match place.map(|place| &place.0) {
         None | Some(SortedValue::Absent) => query.bind(None::<i64>),
         Some(SortedValue::Integer(value)) => query.bind(*value),
         Some(SortedValue::Real(value)) => query.bind(*value),
         Some(SortedValue::Text(value)) => query.bind(value),
     };
-    let rows = query.fetch_all(db).await?;
+    let mut rows = query.fetch_all(db).await?;
+    if is_before {
+        rows.reverse();
+    }
     rows.iter()
         .map(|row| {
             let from: Option<TrialId> = row.try_get("warm_started_from")?;
@@ -148,6 +161,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
                 seconds_total: row.try_get("seconds_total")?,
                 message: row.try_get("message")?,
                 matching: row.try_get("matching")?,
+                before: row.try_get("before")?,
                 place: TrialPlace(sorted_value(row)?, row.try_get("number")?),
             })
         })

@@ -258,6 +258,38 @@ async fn browser_sorts_and_filters_trials_with_and_without_scripts() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn browser_remembers_the_columns_of_trials_and_shows_few_of_them_on_a_phone() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.number_of_trials = 5).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let address = site.at(&format!("/studies/{study}"));
+    let shown =
+        "[...document.querySelectorAll('.trials tbody tr:first-child > *')].filter(cell => cell.offsetParent).length";
+    let fits = "(() => { const box = document.querySelector('#trials .scroll'); return box.scrollWidth <= box.clientWidth + 1 })()";
+
+    let plain = browser.open_without_scripts(&address).await;
+    assert_eq!((plain.value(shown).await.as_str(), plain.count("[data-columns]:not([hidden])").await), ("16", 0));
+    plain.resize(390, 844).await;
+    assert_eq!((plain.value(shown).await.as_str(), plain.value(fits).await.as_str()), ("4", "true"));
+
+    let page = browser.open(&address).await;
+    page.wait_for("[data-columns]:not([hidden])").await;
+    assert_eq!(page.value(shown).await, "16");
+    page.click("[data-columns] summary").await;
+    for column in ["iterations", "reason"] {
+        page.click(&format!("[data-columns] input[value={column}]")).await;
+    }
+    assert_eq!(page.value(shown).await, "14");
+    page.goto(&address).await;
+    page.wait_until(&format!("{shown} === 14")).await;
+    let hidden = "[...document.querySelectorAll('.trials thead th')].filter(th => !th.offsetParent).map(th => th.textContent.trim()).join()";
+    assert_eq!(page.value(hidden).await, "Iterations,Reason");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;

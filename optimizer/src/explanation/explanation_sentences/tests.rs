@@ -2,6 +2,7 @@
 
 use super::super::RelaxedBound;
 use super::*;
+use AngleUnit::{Degree, Radian};
 
 fn named(bound: usize) -> (String, String) {
     (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned())
@@ -78,7 +79,7 @@ fn headline_names_limits_with_their_direction() {
             stopped_early: false,
             missed: None,
         };
-        empty.headline().unwrap()
+        empty.headline(Radian).unwrap()
     };
     assert_eq!(
         of(&[(6, 15.0), (4, 0.1)]),
@@ -114,7 +115,7 @@ fn sentences_of_an_explanation_come_in_order() {
 
 #[test]
 fn conflicts_of_any_number_of_bounds_have_sentences() {
-    let alone = conflict(&[(1, 10.0)]).in_words();
+    let alone = conflict(&[(1, 10.0)]).in_words(Radian);
     // Only the solves that were done, no proof.
     assert!(
         alone.starts_with(
@@ -124,51 +125,51 @@ fn conflicts_of_any_number_of_bounds_have_sentences() {
         "{alone}"
     );
     assert!(alone.ends_with("If this bound is at its loosest value as well, there is a gait."), "{alone}");
-    let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words();
+    let three = conflict(&[(1, 20.0), (4, 0.1), (6, 5.0)]).in_words(Radian);
     assert!(three.contains("(coordinate acceleration), a5 = 0.1 m (swing-foot clearance) and a7 = 5°"), "{three}");
     assert!(three.ends_with("If any one of them is at its loosest value as well, there is a gait."), "{three}");
-    let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words();
+    let fixed = Conflict { naturalness_terms: vec!["a slow start".to_owned()], ..conflict(&[]) }.in_words(Radian);
     assert_eq!(
         fixed,
         "The conflict does not depend on the bounds: fixed constraints conflict with each other (among them a slow start). \
          With every bound at its loosest value, no gait was found from 5 starts; the nearest motion violates the limit \
          of forward hip velocity by 0.107 m/s."
     );
-    let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words();
+    let further = Conflict { without: vec!["a4".to_owned()], ..conflict(&[(7, 5.0)]) }.in_words(Radian);
     assert!(further.starts_with("With a4 at its loosest value, another conflict remains. With a8 = 5°"), "{further}");
 }
 
 #[test]
 fn joint_relaxations_name_their_bounds_together() {
     assert_eq!(
-        together(Some([0.65, 9.1])).in_words(),
+        together(Some([0.65, 9.1])).in_words(Radian),
         "Relaxing these bounds together, to a4 = 0.65 m/s (maximum hip velocity) instead of 0.5 m/s and a8 = 9.1° \
          (ankle angle) instead of 5°, gives a gait; with a4 = 0.61 m/s and a8 = 8.6°, no gait was found from 3 starts."
     );
-    let in_vain = together(None).in_words();
+    let in_vain = together(None).in_words(Radian);
     assert!(
         in_vain.contains("is not sufficient") && in_vain.ends_with("no gait was found from 3 starts."),
         "{in_vain}"
     );
     let both = Explanation { together: vec![together(None), together(Some([0.65, 9.1]))], ..explanation() };
-    let remedies = both.remedies_in_words();
+    let remedies = both.remedies_in_words(Radian);
     assert!(remedies[2].contains("gives a gait") && remedies[3].contains("is not sufficient"), "{remedies:?}");
 }
 
 #[test]
 fn missed_gait_is_not_a_conflict() {
     let found = Explanation { gait_found: true, conflicts: Vec::new(), ..explanation() };
-    let words = found.conflicts_in_words();
+    let words = found.conflicts_in_words(Radian);
     assert!(words.len() == 1 && words[0].contains("the solve missed this gait"), "{words:?}");
 }
 
 #[test]
 fn explanation_without_conflicts_names_the_largest_violation() {
     let earlier = Explanation { conflicts: Vec::new(), ..explanation() };
-    assert_eq!(earlier.conflicts_in_words(), ["Largest violation: stride, walking speed, by 0.107 m/s."]);
+    assert_eq!(earlier.conflicts_in_words(Radian), ["Largest violation: stride, walking speed, by 0.107 m/s."]);
     let nothing = Explanation { violations: Vec::new(), ..earlier };
-    assert!(nothing.conflicts_in_words().is_empty());
-    let unknown = Relaxation { starts: 0, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words();
+    assert!(nothing.conflicts_in_words(Radian).is_empty());
+    let unknown = Relaxation { starts: 0, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words(Radian);
     assert!(unknown.ends_with("with 14.6°, no gait was found."), "{unknown}");
 }
 
@@ -176,7 +177,7 @@ fn explanation_without_conflicts_names_the_largest_violation() {
 fn bound_at_limit_in_all_domains_is_summarised() {
     let everywhere = CYCLE.map(crate::walking::Domain::name);
     assert_eq!(
-        at_limit(1, 20.0, &everywhere).in_words(),
+        at_limit(1, 20.0, &everywhere).in_words(Radian),
         "a2 = 20 rad/s² (coordinate acceleration) is reached in every domain."
     );
 }
@@ -184,10 +185,10 @@ fn bound_at_limit_in_all_domains_is_summarised() {
 #[test]
 fn undecided_solves_get_a_caveat() {
     for words in [
-        Relaxation { undecided: true, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words(),
-        Relaxation { undecided: true, ..relaxation(3, (0.5, None, 3.0)) }.in_words(),
-        JointRelaxation { undecided: true, ..together(None) }.in_words(),
-        Conflict { undecided: true, ..conflict(&[(1, 10.0)]) }.in_words(),
+        Relaxation { undecided: true, ..relaxation(6, (5.0, Some(15.0), 14.6)) }.in_words(Radian),
+        Relaxation { undecided: true, ..relaxation(3, (0.5, None, 3.0)) }.in_words(Radian),
+        JointRelaxation { undecided: true, ..together(None) }.in_words(Radian),
+        Conflict { undecided: true, ..conflict(&[(1, 10.0)]) }.in_words(Radian),
     ] {
         assert!(words.contains("so a gait may exist"), "{words}");
     }
@@ -210,4 +211,13 @@ fn relief_is_the_smallest_sufficient_relaxation() {
     assert_eq!(found.relief().map(|relaxation| relaxation.bound.as_str()), Some("a7"));
     found.relaxations.remove(0);
     assert_eq!(found.relief(), None);
+}
+
+#[test]
+fn angles_in_sentences_are_in_radians_or_in_degrees() {
+    let lean = conflict(&[(5, 0.3)]);
+    assert!(lean.in_words(Radian).starts_with("With a6 = 0.3 rad (torso lean)"));
+    assert!(lean.in_words(Degree).starts_with("With a6 = 17.2° (torso lean)"));
+    let relaxed = relaxation(5, (0.3, Some(0.4), 0.35)).in_words(Degree);
+    assert!(relaxed.contains("to 22.9° instead of 17.2°") && relaxed.contains("with 20.1°"), "{relaxed}");
 }

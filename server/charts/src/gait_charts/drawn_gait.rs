@@ -10,7 +10,7 @@ pub(super) const STRIDE: &str = "gait cycle from right heel strike, %";
 const DRAWN_PARTS: usize = 6;
 
 /// A gait as it is drawn: smooth between its nodes.
-pub(super) fn drawn(gait: &Gait) -> Gait {
+pub fn drawn(gait: &Gait) -> Gait {
     gait.refined(DRAWN_PARTS)
 }
 

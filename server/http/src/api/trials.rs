@@ -92,7 +92,7 @@ pub(super) async fn of_study(
         state,
         contains: String::new(),
         limit: paging.to_read(),
-        start: paging.after.clone().map_or(Start::Skip(0), Start::After),
+        start: paging.after.clone().map_or(Start::First, Start::After),
     };
     let listed = trial_list::of_study(&mut reader, id, &listing).await?;
     let (listed, next) = paging.page(listed, |trial| trial.place.clone())?.into_parts();

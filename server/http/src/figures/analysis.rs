@@ -2,7 +2,7 @@
 
 use super::maps_over_two_bounds::{AxisChoice, chosen, maps};
 use super::trials_by_bound::{by_bound, parallel};
-use crate::format::meaning;
+use crate::bound_units::{self, meaning};
 use crate::shared_state::AppState;
 use gait_learner::{Dimension, Marginal};
 use gaitwright_charts::{Chart, Figure, Stroke};
@@ -71,8 +71,9 @@ pub(crate) fn marginals(analysis: &Analysis) -> Vec<Figure> {
     let all = || analysis.marginals.iter().flatten().flat_map(ends);
     let range = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
     let draw = |(dimension, levels): (&Dimension, &Vec<Marginal>)| {
-        let line = levels.iter().map(|m| (m.value, m.average.mean)).collect();
-        let band = levels.iter().map(|m| (m.value, ends(m)[0], ends(m)[1])).collect();
+        let at = |m: &Marginal| bound_units::shown(&dimension.name, m.value);
+        let line = levels.iter().map(|m| (at(m), m.average.mean)).collect();
+        let band = levels.iter().map(|m| (at(m), ends(m)[0], ends(m)[1])).collect();
         let label = format!("{}: {}", dimension.name, meaning(&dimension.name));
         let mut chart = Chart::new(&label, &label, "utility").with_band("one standard deviation", 0, band).with(
             "mean",
@@ -81,7 +82,7 @@ pub(crate) fn marginals(analysis: &Analysis) -> Vec<Figure> {
             line,
         );
         chart.y_range = Some(range);
-        chart.x_ticks.clone_from(&dimension.values);
+        chart.x_ticks = bound_units::all_shown(&dimension.name, &dimension.values);
         Figure::chart("utility", chart)
     };
     analysis.posterior.space().dimensions().iter().zip(&analysis.marginals).map(draw).collect()

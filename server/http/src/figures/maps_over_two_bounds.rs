@@ -1,6 +1,7 @@
 //! Maps of the posterior over two tuned bounds, the others held: utility and probability of converging.
 
-use crate::format::{meaning, percent, signed};
+use crate::bound_units::{self, meaning};
+use crate::format::{percent, signed};
 use gait_learner::{LearnerError, MainEffect, SearchSpace};
 use gaitwright_charts::{Figure, HeatMap, Tile};
 use gaitwright_service::error::Error;
@@ -26,7 +27,7 @@ pub(crate) struct Maps {
 
 pub(crate) struct DimensionChoice {
     pub(crate) name: String,
-    pub(crate) meaning: &'static str,
+    pub(crate) meaning: String,
     pub(crate) x: bool,
     pub(crate) y: bool,
 }
@@ -105,7 +106,8 @@ pub(crate) fn maps(
     let range = (means().fold(f64::INFINITY, f64::min), means().fold(f64::NEG_INFINITY, f64::max));
     let axis = |place: usize| {
         let dimension = &space.dimensions()[place];
-        (format!("{}: {}", dimension.name, meaning(&dimension.name)), dimension.values.clone())
+        let label = format!("{}: {}", dimension.name, meaning(&dimension.name));
+        (label, bound_units::all_shown(&dimension.name, &dimension.values))
     };
     let draw = |title: &str, cells, range| {
         let group = format!("{} {}", space.dimensions()[right].name, space.dimensions()[down].name);

@@ -60,7 +60,7 @@ pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Resul
 
 /// The joint angles of two gaits, named by their trials, over the reference gait.
 pub(crate) fn pair((a, gait_a): (u32, &Gait), (b, gait_b): (u32, &Gait), reference: &ReferenceGait) -> Vec<Figure> {
-    let (a, b) = (format!("gait A, trial {a}"), format!("gait B, trial {b}"));
+    let (a, b) = (format!("first: trial {a}"), format!("second: trial {b}"));
     let charts = gait_charts::with_reference(&[(&a, gait_a), (&b, gait_b)], reference);
     charts.into_iter().map(|chart| Figure::chart("pair", chart)).collect()
 }

@@ -1,6 +1,7 @@
 //! Trials by the values of their bounds: parallel coordinates of all bounds, and one chart for a single bound.
 
-use crate::format::{decimal, meaning, signed};
+use crate::bound_units::{self, meaning};
+use crate::format::{decimal, signed};
 use gait_learner::LearnerError;
 use gaitwright_charts::{Chart, Figure, Parallel, ParallelAxis, ParallelLine, PointLink};
 use gaitwright_service::studies::analysis::Analysis;
@@ -78,8 +79,8 @@ pub(crate) fn parallel(snapshot: &StudySnapshot, analysis: &Analysis) -> Result<
     let (space, shown) = (analysis.posterior.space(), TrialMeasure::of(snapshot));
     let axes = space.dimensions().iter().map(|dimension| ParallelAxis {
         name: dimension.name.clone(),
-        meaning: meaning(&dimension.name).to_owned(),
-        values: dimension.values.clone(),
+        meaning: meaning(&dimension.name),
+        values: bound_units::all_shown(&dimension.name, &dimension.values),
     });
     let line = |drawn: DrawnTrial<'_>| {
         let levels = space.levels(space.check(drawn.trial.action_index)?);
@@ -108,10 +109,11 @@ pub(crate) fn by_bound(
 ) -> Result<Option<Figure>, LearnerError> {
     let (space, shown) = (analysis.posterior.space(), TrialMeasure::of(snapshot));
     let Some(bound) = space.dimensions().get(dimension) else { return Ok(None) };
+    let values = bound_units::all_shown(&bound.name, &bound.values);
     let mut points = Vec::new();
     for drawn in drawn(snapshot, analysis)? {
         let level = space.levels(space.check(drawn.trial.action_index)?)[dimension];
-        points.extend(drawn.outcome.map(|outcome| ((bound.values[level], outcome), drawn.link)));
+        points.extend(drawn.outcome.map(|outcome| ((values[level], outcome), drawn.link)));
     }
     if points.is_empty() {
         return Ok(None);
@@ -119,6 +121,6 @@ pub(crate) fn by_bound(
     let title = format!("Trials by {}", bound.name);
     let across = format!("{}: {}", bound.name, meaning(&bound.name));
     let mut chart = Chart::new(&title, &across, shown.label()).with_links("trial", 0, points);
-    chart.x_ticks.clone_from(&bound.values);
+    chart.x_ticks = values;
     Ok(Some(Figure::chart("", chart)))
 }

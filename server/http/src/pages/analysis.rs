@@ -5,11 +5,12 @@ use super::page_chart::{PageChart, shared_legend};
 use super::study::answer_in_words;
 use crate::AppState;
 use crate::authorization::Authorized;
+use crate::bound_units;
 use crate::extractors::Params;
 use crate::figures::analysis::{AnalysisState, analysis_of, marginals};
 use crate::figures::maps_over_two_bounds::{AxisChoice, DimensionChoice, MAP_NOTES, Maps, chosen, maps};
 use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
-use crate::format::{self, decimal, meaning, percent};
+use crate::format::{self, decimal, percent};
 use crate::page_error::{PageResult, page};
 use crate::visible::Visible;
 use askama::Template;
@@ -78,11 +79,11 @@ struct GaitRow {
 /// The main effect of a bound.
 struct MainEffectRow {
     name: String,
-    limited: &'static str,
+    limited: String,
     bar: EffectBar,
     effect: String,
-    best: f64,
-    worst: f64,
+    best: String,
+    worst: String,
     is_distinguishable: bool,
 }
 
@@ -230,7 +231,7 @@ fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
         let effect = &analysis.main_effects[place];
         let name = &dimensions[place].name;
         MainEffectRow {
-            limited: meaning(name),
+            limited: bound_units::meaning(name),
             name: name.clone(),
             bar: EffectBar {
                 zero: at(0.0),
@@ -239,8 +240,8 @@ fn main_effects(analysis: &Analysis) -> Vec<MainEffectRow> {
                 high: at(effect.difference.mean + effect.difference.standard_deviation),
             },
             effect: format!("{:.2} ± {:.2}", effect.difference.mean, effect.difference.standard_deviation),
-            best: effect.best,
-            worst: effect.worst,
+            best: bound_units::number(name, effect.best),
+            worst: bound_units::number(name, effect.worst),
             is_distinguishable: is_distinguishable(&effect.difference),
         }
     };

@@ -58,12 +58,12 @@ fn by_utility(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<String> {
     let gaits = analysis.gaits.len();
     Some(if is_distinguishable(&difference) {
         format!(
-            "After {comparisons}, the learner is {sure} sure that this gait is better than that of trial {number}, the \
+            "After {comparisons}, the learner is {sure} sure that the recommended gait is better than that of trial {number}, the \
              next best of {gaits} different gaits."
         )
     } else {
         format!(
-            "Too few comparisons to tell: after {comparisons}, the learner is only {sure} sure that this gait is better \
+            "Too few comparisons to tell: after {comparisons}, the learner is only {sure} sure that the recommended gait is better \
              than that of trial {number}, the next best of {gaits} different gaits."
         )
     })

@@ -3,12 +3,12 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::bound_units::with_angles_in_degrees;
 use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, Difference, RECOVERY_STRIDES};
-use gait_optimizer::number_format::with_unit;
 use gaitwright_service::access::Run;
 use gaitwright_service::job::JobState;
 use gaitwright_service::studies::certificate_request;
@@ -82,7 +82,7 @@ pub(super) struct FormattedCheck {
 impl FormattedCheck {
     fn new(check: Check) -> Self {
         let in_unit = |value: Option<f64>, otherwise: &str| {
-            value.map_or_else(|| otherwise.to_owned(), |value| with_unit(format::number(value), &check.unit))
+            value.map_or_else(|| otherwise.to_owned(), |value| with_angles_in_degrees(value, &check.unit))
         };
         Self {
             value: in_unit(check.value, "not determined"),

@@ -99,13 +99,16 @@ impl Refusal {
 impl ComparePage {
     /// Answers under a gait: value, label, keys, and the key that the button shows.
     const BETTER: [(&str, &str, &str, &str); 2] =
-        [("a", "Gait A is better", "ArrowLeft 1", "←"), ("b", "Gait B is better", "ArrowRight 3", "→")];
+        [("a", "First is better", "ArrowLeft 1", "←"), ("b", "Second is better", "ArrowRight 3", "→")];
     /// Answers between the gaits.
     const BETWEEN: [(&str, &str, &str, &str); 2] =
         [("no_difference", "No difference", "2", "2"), ("cannot_tell", "Cannot tell", "", "")];
     /// Safety reports.
-    const UNSAFE: [(&str, &str); 3] =
-        [("unsafe_a", "Gait A is unsafe"), ("unsafe_b", "Gait B is unsafe"), ("unsafe_both", "Both gaits are unsafe")];
+    const UNSAFE: [(&str, &str); 3] = [
+        ("unsafe_a", "The first gait is unsafe"),
+        ("unsafe_b", "The second gait is unsafe"),
+        ("unsafe_both", "Both gaits are unsafe"),
+    ];
 
     /// Whether the page asks about its gaits, and does not only say what was saved.
     fn asks(&self) -> bool {
@@ -169,7 +172,8 @@ pub(super) async fn get(
         (typed.author, typed.source) = (user.clone(), Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
-        let refused = Refusal::correctable("Gait A and gait B are the same. Choose two different gaits.".to_owned());
+        let refused =
+            Refusal::correctable("The first and the second gait are the same. Choose two different gaits.".to_owned());
         return Box::pin(show(&mut app, id, GaitsQuery { a: None, b: None, ..choice }, (user, typed), Some(refused)))
             .await;
     }
@@ -271,7 +275,7 @@ async fn show(
         let (files, query) = (format!("/api/v1/trials/{a}/figures"), format!("?other={b}"));
         let drawn = |figure: &Figure| PageChart::of(figure, &files, &query);
         let charts = trial::pair((of_a, &gait_a), (of_b, &gait_b), &reference).iter().map(drawn).collect();
-        let walking = walking_pair([(a, of_a, "Gait A".to_owned(), &gait_a), (b, of_b, "Gait B".to_owned(), &gait_b)]);
+        let walking = walking_pair([(a, of_a, "First".to_owned(), &gait_a), (b, of_b, "Second".to_owned(), &gait_b)]);
         Ok::<_, Error>((charts, walking.into_iter().flatten().collect()))
     };
     let (mut charts, walking): (Vec<PageChart>, _) = app.compute(draw).await.map_err(Error::from)??;

@@ -123,8 +123,8 @@ pub(super) enum AnswerOutcome {
 
 /// The labels of the form.
 pub(super) const LABELS: [(&str, &str); 6] = [
-    ("a", "Gait A"),
-    ("b", "Gait B"),
+    ("a", "First gait"),
+    ("b", "Second gait"),
     ("answer", "Answer"),
     ("source", "This person is"),
     ("author", "Name or code"),

@@ -4,13 +4,14 @@
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::bound_units::{self, ANGLES};
 use crate::extractors::Form;
 use crate::format;
 use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
+use gait_optimizer::Violation;
 use gait_optimizer::explanation::{Explanation, quantity, status_in_words};
-use gait_optimizer::{TunedBounds, Violation};
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
@@ -78,7 +79,7 @@ impl NoGait {
     }
 
     pub(super) fn amount(violation: &Violation) -> String {
-        format::number(violation.amount)
+        format::number(ANGLES.shown(violation.amount, &violation.unit))
     }
 }
 
@@ -119,7 +120,7 @@ impl FeasibleRelaxation {
     }
 
     fn of(relaxation: &RelaxedBounds, possible: Result<RelaxedTrial, NoRelaxedTrial>) -> Self {
-        let label = |(bound, value): &(String, f64)| quantity(bound, *value);
+        let label = |(bound, value): &(String, f64)| quantity(bound, *value, ANGLES);
         let relax = |(bound, value): &(String, f64)| format!("{bound}={value}");
         let offer = |trial: RelaxedTrial| RelaxedTrialOffer {
             bounds: trial
@@ -141,7 +142,7 @@ impl FeasibleRelaxation {
 
 /// `a7 = 35°`.
 fn with_unit(bound: &str, value: f64) -> String {
-    format!("{bound} = {}", TunedBounds::in_unit(bound, value))
+    format!("{bound} = {}", bound_units::in_unit(bound, value))
 }
 
 /// Which relaxation of the explanation to try, counted from 0.

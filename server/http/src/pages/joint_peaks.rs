@@ -1,6 +1,7 @@
 //! The largest torques and powers of each joint, with the limits of the torques.
 
 use gait_optimizer::Gait;
+use gaitwright_charts::gait_charts;
 
 const JOINTS: [&str; 6] = ["Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
 /// Index in q of the first joint.
@@ -17,11 +18,12 @@ pub(super) struct JointPeaks {
 }
 
 impl JointPeaks {
-    /// The rows of a gait, from its nodes.
+    /// The rows of a gait: the extremes of the curves that the charts draw.
     pub(super) fn of(gait: &Gait) -> Vec<Self> {
+        let gait = gait_charts::drawn(gait);
         let mass_kg = gait.subject.body_mass_kg;
         let limits = gait.settings.limits.joint_torques_n_m(&gait.device);
-        let per_kg = |value: f64, digits: usize| format!("{:.digits$}", value.max(0.0) / mass_kg);
+        let per_kg = |value: f64| format!("{:.2}", value.max(0.0) / mass_kg);
         let row = |(joint, name): (usize, &&'static str)| {
             let nodes = || gait.domains.iter().flat_map(|domain| domain.u.iter().zip(&domain.qd));
             let torque = |sign: f64| nodes().map(|(u, _)| sign * u[joint]).fold(0.0, f64::max);
@@ -29,9 +31,9 @@ impl JointPeaks {
             let (low, high) = limits[joint];
             Self {
                 joint: name,
-                torques: [per_kg(torque(-1.0), 2), per_kg(torque(1.0), 2)],
-                limits: [per_kg(-low, 2), per_kg(high, 2)],
-                powers: [per_kg(power(1.0), 1), per_kg(power(-1.0), 1)],
+                torques: [per_kg(torque(-1.0)), per_kg(torque(1.0))],
+                limits: [per_kg(-low), per_kg(high)],
+                powers: [per_kg(power(1.0)), per_kg(power(-1.0))],
             }
         };
         JOINTS.iter().enumerate().map(row).collect()

@@ -1,5 +1,6 @@
 //! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
 
+use super::lab_session_state::{is_complete, state_in_words};
 use super::measurement_forms::{FilterFields, Forms};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
@@ -9,7 +10,7 @@ use crate::extractors::Form;
 use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
 use crate::form_errors;
-use crate::format::{self, words};
+use crate::format;
 use crate::page_error::{PageError, PageResult, page};
 use crate::problem_details::Problem;
 use crate::visible::Visible;
@@ -98,7 +99,7 @@ async fn show_list(
     };
     let shown = |session| {
         let view = LabSessionView::from(&session);
-        let (name_in_lab, state) = (lab::name_in_lab(view.id), words(view.state.as_str()));
+        let (name_in_lab, state) = (lab::name_in_lab(view.id), state_in_words(&view));
         (view, name_in_lab, state)
     };
     page(&SessionsPage {
@@ -160,6 +161,13 @@ struct SessionPage {
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
     session: LabSessionView,
+}
+
+impl SessionPage {
+    /// Whether nothing is left to do on the tablet.
+    fn is_complete(&self) -> bool {
+        is_complete(&self.session)
+    }
 }
 
 /// The results of the EMG recordings.
@@ -285,10 +293,21 @@ pub(super) async fn show(
         (session, emg, drawings)
     };
     let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
+    let recorded: Vec<u8> =
+        session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect();
+    // The newest file of each kind is used, so an upload begins with a walk that has none.
+    let has_file = |walk: u8, kind| recordings.iter().any(|file| file.kind == kind && file.walk == walk);
+    let next = |kind| recorded.iter().copied().find(|walk| !has_file(*walk, kind)).unwrap_or_default();
+    if forms.emg.walk == 0 {
+        forms.emg.walk = next(MeasurementKind::Emg);
+    }
+    if forms.joint_angles.walk == 0 {
+        forms.joint_angles.walk = next(MeasurementKind::JointAngles);
+    }
     page(&SessionPage {
         study,
         name_in_lab: lab::name_in_lab(session.id),
-        state: words(session.state.as_str()),
+        state: state_in_words(&session),
         gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
         walks: session
             .walks
@@ -297,7 +316,7 @@ pub(super) async fn show(
             .collect(),
         may_run: caller.may(Run::NEEDED),
         may_unblind: caller.may(Administer::NEEDED),
-        recorded: session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect(),
+        recorded,
         has_emg: recordings.iter().any(|recording| recording.kind == MeasurementKind::Emg),
         recordings,
         filters: forms

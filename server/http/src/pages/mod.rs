@@ -19,6 +19,7 @@ mod help;
 mod home;
 mod jobs;
 mod joint_peaks;
+mod lab_session_state;
 mod lab_sessions;
 mod lab_tablet;
 mod measurement_files;

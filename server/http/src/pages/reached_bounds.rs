@@ -1,5 +1,6 @@
 //! Which bounds a gait reaches, and for which values of each it stays the same.
 
+use crate::bound_units::{self, ANGLES, Bound};
 use crate::format;
 use gait_optimizer::gait::kept_clearance_m;
 use gait_optimizer::{Gait, TunedBounds, UnchangedBound};
@@ -7,7 +8,7 @@ use gaitwright_service::error::Error;
 
 /// A bound, and the extreme value that the gait reaches.
 pub(super) struct BoundUse {
-    pub(super) bound: format::Bound,
+    pub(super) bound: Bound,
     /// The extreme value of the gait; `None` if it is not computed.
     pub(super) reached: Option<String>,
     /// Whether any change of the bound changes the gait.
@@ -27,28 +28,45 @@ pub(super) fn of(
 ) -> Result<Vec<BoundUse>, Error> {
     let extremes = gait.map(extremes).transpose()?.unwrap_or_default();
     let values = action.to_array();
-    let with_use = |(place, bound): (usize, format::Bound)| {
+    let with_use = |(place, bound): (usize, Bound)| {
         let value = values[place];
         let interval = unchanged.iter().find(|interval| interval.bound == bound.name);
         BoundUse {
             unchanged_for: interval.map(|interval| in_words(interval, value)),
-            bound,
-            reached: extremes[place].map(format::number),
+            reached: extremes[place].map(|reached| format::number(bound_units::shown(bound.name, reached))),
             active: interval.is_some_and(|interval| interval.is_active(value)),
+            bound: Bound { value: with_tolerance(&bound, value, gait), ..bound },
         }
     };
-    Ok(format::bounds(action).into_iter().enumerate().map(with_use).collect())
+    Ok(bound_units::bounds(action).into_iter().enumerate().map(with_use).collect())
+}
+
+/// The value of a bound, and the tolerance that takes its place if it is smaller.
+fn with_tolerance(bound: &Bound, value: f64, gait: Option<&Gait>) -> String {
+    let tolerance = gait.map(|gait| gait.settings.limits.torso_tolerance_rad).filter(|tolerance| value < *tolerance);
+    match tolerance {
+        Some(tolerance) if bound.name == "a6" => {
+            format!("{} (acts as {})", bound.value, bound_units::number(bound.name, tolerance))
+        }
+        _ => bound.value.clone(),
+    }
 }
 
 /// An interval around the value of the bound. Its ends are rounded towards that value.
 fn in_words(interval: &UnchangedBound, value: f64) -> String {
-    let least = interval.least.map(|least| rounded(least, f64::ceil).min(value));
-    let most = interval.most.map(|most| rounded(most, f64::floor).max(value));
+    let unit = TunedBounds::unit_of(&interval.bound);
+    let in_page_unit = |value: f64| ANGLES.converted(value, unit);
+    if (interval.least, interval.most) == (Some(value), Some(value)) {
+        return "this value only".to_owned();
+    }
+    let value = in_page_unit(value);
+    let least = interval.least.map(|least| rounded(in_page_unit(least), f64::ceil).min(value));
+    let most = interval.most.map(|most| rounded(in_page_unit(most), f64::floor).max(value));
     match (least, most) {
         (None, None) => "any value".to_owned(),
         (Some(least), None) => format!("{} or more", format::number(least)),
         (None, Some(most)) => format!("{} or less", format::number(most)),
-        (Some(least), Some(most)) if least == most => "this value only".to_owned(),
+        (Some(least), Some(most)) if least == most => format!("about {}", format::number(least)),
         (Some(least), Some(most)) => format!("{} to {}", format::number(least), format::number(most)),
     }
 }
@@ -88,11 +106,14 @@ mod tests {
 
     #[test]
     fn ends_of_an_interval_are_rounded_towards_the_bound() {
-        let words = |least, most| in_words(&UnchangedBound { bound: "a6".to_owned(), least, most }, 0.2);
+        let words = |least, most| in_words(&UnchangedBound { bound: "a5".to_owned(), least, most }, 0.2);
         assert_eq!(words(Some(0.142_97), None), "0.143 or more");
         assert_eq!(words(None, Some(0.885_54)), "0.885 or less");
         assert_eq!(words(Some(0.199_96), Some(1.2345)), "0.2 to 1.23");
         assert_eq!(words(Some(0.2), Some(0.2)), "this value only");
+        assert_eq!(words(Some(0.199_96), Some(0.200_02)), "about 0.2");
         assert_eq!(words(None, None), "any value");
+        let lean = UnchangedBound { bound: "a6".to_owned(), least: Some(0.142_97), most: Some(0.2) };
+        assert_eq!(in_words(&lean, 0.2), "8.2 to 11.5", "angles are in degrees");
     }
 }

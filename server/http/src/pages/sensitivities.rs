@@ -1,7 +1,8 @@
 //! Sensitivities on the page of a gait.
 
+use crate::bound_units::{self, ANGLES};
 use crate::format;
-use gait_optimizer::TunedBounds;
+use gait_optimizer::number_format::with_unit;
 use gait_optimizer::sensitivity::BoundSensitivity;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
@@ -38,24 +39,25 @@ impl SensitivityTable {
         let rows = found.bounds.iter().zip(&steps);
         let rows =
             rows.filter_map(|(bound, step)| Some(SensitivityRow::new(bound, step.as_ref()?, found.cost_of_transport)));
-        Ok(Self { sentences: found.sentences(), rows: rows.collect() })
+        Ok(Self { sentences: found.sentences(ANGLES), rows: rows.collect() })
     }
 }
 
 impl SensitivityRow {
     fn new(bound: &BoundSensitivity, step: &BoundStep, cost_of_transport: f64) -> Self {
+        let number = |value: f64| format::number(bound_units::shown(bound.bound, value));
         let is_active = !bound.active.is_empty();
         let changes = |text: String| if is_active { text } else { "no change".to_owned() };
         Self {
             bound: bound.bound,
-            step: TunedBounds::in_unit(
-                bound.bound,
-                format_args!("{} to {}", format::number(bound.value), format::number(step.to)),
+            step: with_unit(
+                format_args!("{} to {}", number(bound.value), number(step.to)),
+                bound_units::unit(bound.bound),
             ),
             cost: changes(change(100.0 * step.cost_of_transport / cost_of_transport)),
             rmse: changes(change(step.gait_rmse_rad)),
             beyond: !step.keeps_active,
-            interval: bound.interval_in_words(format::number),
+            interval: bound.interval_in_words(number),
             active: domains(bound),
         }
     }

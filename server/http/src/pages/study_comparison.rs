@@ -1,10 +1,12 @@
 //! The page that compares two studies in one chart and one table.
 
 use super::page_chart::PageChart;
+use super::study::preferred;
 use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
+use crate::bound_units;
 use crate::extractors::Params;
 use crate::figures::{COURSE, StudyOutcome, StudyResults, course, have_one_reference_gait};
 use crate::format;
@@ -18,6 +20,7 @@ use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
+use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{AnswerSource, Study, StudyFilter};
 use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
 use serde::Deserialize;
@@ -41,6 +44,8 @@ struct SideBySide {
     a: Option<StudyId>,
     b: Option<StudyId>,
     compared: Option<Compared>,
+    /// Whether the same study was chosen twice.
+    is_same: bool,
 }
 
 impl SideBySide {
@@ -54,8 +59,12 @@ struct Compared {
     b: Study,
     /// Whether the studies have the same reference gait; otherwise no Gait RMSE is shown.
     comparable: bool,
-    /// Whether people answer in both studies, so that Gait RMSE does not rank their gaits.
-    people_decide: bool,
+    /// What the answers of people say of the recommended gait of each study: its name, and a sentence. Empty if people answer
+    /// in neither, because Gait RMSE alone then ranks the gaits.
+    answers: Vec<(String, String)>,
+    /// The utility of the recommended gait of each study in which people answer.
+    utilities: Vec<PageChart>,
+    /// Gait RMSE of the best actions.
     chart: Option<PageChart>,
     /// Names of studies without a best action to draw.
     without_course: Vec<String>,
@@ -79,10 +88,7 @@ pub(super) async fn get(
     offered.retain(|study| shown.contains(&study.plan.subject_id));
     let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
     let compared = match (a, b) {
-        (Some(a), Some(b)) if a == b => {
-            return Err(Error::invalid("b", b.to_string(), "a study other than study A").into());
-        }
-        (Some(a), Some(b)) => {
+        (Some(a), Some(b)) if a != b => {
             let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
             drop(reader);
             let analyses = Arc::clone(&app.analyses);
@@ -94,11 +100,12 @@ pub(super) async fn get(
             None
         }
     };
+    let is_same = a.is_some() && a == b;
     // The form proposes two different studies: the newest ones besides the chosen one.
     let other_than = |taken: Option<StudyId>| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
     let a = a.or_else(|| other_than(b));
-    let b = b.or_else(|| other_than(a));
-    page(&SideBySide { offered, a, b, compared })
+    let b = b.filter(|_| !is_same).or_else(|| other_than(a));
+    page(&SideBySide { offered, a, b, compared, is_same })
 }
 
 /// Adds the best gaits.
@@ -122,6 +129,22 @@ async fn with_best_gaits(
     };
     compared.walking = app.compute(draw).await??.collect();
     Ok(compared)
+}
+
+/// Whether people answer the comparisons of a study, alone or beside Gait RMSE.
+fn people_answer(study: &Study) -> bool {
+    study.plan.answer_source != AnswerSource::GaitRmse
+}
+
+/// What the answers of people say of the recommended gait, as the end of a sentence about the study.
+fn answers(snapshot: &StudySnapshot, outcome: &StudyOutcome) -> String {
+    let best = outcome.best.and_then(|id| snapshot.trial(id));
+    match best.map(|trial| preferred(trial, snapshot)) {
+        _ if !people_answer(&snapshot.study) => "Gait RMSE answers every comparison".to_owned(),
+        None => "no gait is recommended yet".to_owned(),
+        Some(words) if words.is_empty() => "no person has answered a comparison of the recommended gait yet".to_owned(),
+        Some(words) => words,
+    }
 }
 
 /// The properties and results of a study.
@@ -153,10 +176,10 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
     }
     let cost = best.and_then(|trial| trial.cost_of_transport);
     rows.push(("Cost of transport of the recommended trial".to_owned(), format::decimal(cost)));
-    let bounds = best.map(|trial| trial.action.to_array());
-    for (place, name) in TunedBounds::NAMES.iter().enumerate() {
-        let value = bounds.map_or_else(|| "–".to_owned(), |bounds| bounds[place].to_string());
-        rows.push((format!("{name}: {}", TunedBounds::MEANINGS[place]), value));
+    let bounds = best.map(|trial| bound_units::bounds(&trial.action));
+    for (place, name) in TunedBounds::NAMES.into_iter().enumerate() {
+        let value = bounds.as_ref().map_or_else(|| "–".to_owned(), |bounds| bounds[place].value.clone());
+        rows.push((format!("{name}: {}", bound_units::meaning(name)), value));
     }
     rows
 }
@@ -170,8 +193,18 @@ fn compare(
     let (of_a, of_b) = (a.outcome(pool, analyses)?, b.outcome(pool, analyses)?);
     let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
     let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
-    let people_decide = both.iter().all(|(snapshot, _)| snapshot.study.plan.answer_source == AnswerSource::People);
-    let chart = if comparable && !people_decide { course(&both) } else { None };
+    let asks_people = both.iter().any(|(snapshot, _)| people_answer(&snapshot.study));
+    let named = |(snapshot, outcome): &(&StudySnapshot, &StudyOutcome)| {
+        (snapshot.study.plan.name.clone(), answers(snapshot, outcome))
+    };
+    let mut utilities = Vec::new();
+    for study in [&a, &b] {
+        let files = format!("/api/v1/studies/{}/figures", study.snapshot.study.id);
+        let title = format!("{}: utility of the recommended gait", study.snapshot.study.plan.name);
+        let chart = study.utility(pool, analyses)?.map(|figure| PageChart::of(&figure, &files, ""));
+        utilities.extend(chart.map(|chart| PageChart { title, ..chart }));
+    }
+    let chart = if comparable { course(&both) } else { None };
     let chart = chart.map(|chart| {
         let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
         PageChart::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
@@ -184,7 +217,8 @@ fn compare(
         rows: properties.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
         without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
         comparable,
-        people_decide,
+        answers: both.iter().filter(|_| asks_people).map(named).collect(),
+        utilities,
         chart,
         a: a.snapshot.study,
         b: b.snapshot.study,

@@ -2,6 +2,7 @@
 
 use super::fields::{KEPT, LEARNERS, NewStudyFields, learner};
 use crate::accessible::Named;
+use crate::bound_units;
 use gait_optimizer::{LocalOptimumChoice, TunedBounds};
 use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
@@ -52,14 +53,15 @@ impl NewStudyFields {
             let to = all[place];
             let as_loose = |value: &f64| if TunedBounds::IS_LOWER[place] { *value < to } else { *value > to };
             let values = self.space.get(&format!("values_{name}")).map_or("", String::as_str);
-            let mut kept: Vec<f64> = values.split(", ").filter_map(|v| v.parse().ok()).filter(as_loose).collect();
+            let values = bound_units::read_list(name, values).unwrap_or_default();
+            let mut kept: Vec<f64> = values.into_iter().filter(as_loose).collect();
             kept.push(to);
             kept.sort_by(f64::total_cmp);
-            self.space.insert(format!("fixed_{name}"), to.to_string());
+            self.space.insert(format!("fixed_{name}"), bound_units::entry(name, to));
             if kept.len() < 2 {
                 self.space.remove(&format!("tuned_{name}"));
             } else {
-                self.space.insert(format!("values_{name}"), list(&kept));
+                self.space.insert(format!("values_{name}"), bound_units::list(name, &kept));
             }
         }
         self.relaxed = true;
@@ -75,20 +77,16 @@ pub(super) async fn cloned(db: &mut Connection, reach: Reach, fields: &NewStudyF
     Ok(Some(studies::get(db, id).await?))
 }
 
-fn list(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
-}
-
 /// The entries of the editor for the search space of a study.
 fn space_of(plan: &StudyPlan) -> BTreeMap<String, String> {
     let fixed = plan.base_bounds.to_array();
     let mut space = BTreeMap::new();
     for (place, name) in TunedBounds::NAMES.into_iter().enumerate() {
-        space.insert(format!("fixed_{name}"), fixed[place].to_string());
+        space.insert(format!("fixed_{name}"), bound_units::entry(name, fixed[place]));
         if let Some(dimension) = plan.search_space.dimensions().iter().find(|dimension| dimension.name == name) {
             space.insert(format!("tuned_{name}"), "on".to_owned());
-            space.insert(format!("values_{name}"), list(&dimension.values));
-            space.insert(format!("lengthscale_{name}"), dimension.lengthscale.to_string());
+            space.insert(format!("values_{name}"), bound_units::list(name, &dimension.values));
+            space.insert(format!("lengthscale_{name}"), bound_units::entry(name, dimension.lengthscale));
         }
     }
     space

@@ -297,14 +297,14 @@ mod tests {
             ("values_a5", "0, 0.02, 0.04"),
             ("tuned_a7", "on"),
             ("values_a7", "10, 20, 30"),
-            ("fixed_a6", "0.1"),
+            ("fixed_a6", "5.73"),
         ];
         let space = entries.iter().map(|(name, value)| (text(name), text(value))).collect();
         let mut fields = NewStudyFields { space, ..NewStudyFields::default() };
         fields.relax("a5=0.03,a7=30,a6=0.2").unwrap();
         assert_eq!(fields.space["values_a5"], "0, 0.02, 0.03", "a lower bound is looser where it is smaller");
         assert!(!fields.space.contains_key("tuned_a7"), "one value is not tuned");
-        assert_eq!((fields.space["fixed_a7"].as_str(), fields.space["fixed_a6"].as_str()), ("30", "0.2"));
+        assert_eq!((fields.space["fixed_a7"].as_str(), fields.space["fixed_a6"].as_str()), ("30", "11.46"));
         assert!(fields.relax("a9=1").is_err() && fields.relax("a7=500").is_err());
     }
 

@@ -1,16 +1,18 @@
 //! The editor of the search space: tuned bounds with their values, and fixed values of the others.
 
+use crate::bound_units;
 use crate::form_errors;
 use gait_learner::{Dimension, LearnerError, SearchSpace};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::bound_grid::TABLE_I;
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// The entries of one bound.
 pub(super) struct BoundEntries {
     pub(super) name: &'static str,
-    pub(super) meaning: &'static str,
+    pub(super) meaning: String,
     pub(super) allowed: String,
     pub(super) tuned: bool,
     pub(super) values: String,
@@ -40,18 +42,16 @@ impl SpaceEditor {
         }
         let defaults = TunedBounds::default().to_array();
         let row = |(bound, name): (usize, &'static str)| {
-            let (low, high) = TunedBounds::RANGES[bound];
             let (values, lengthscale) = TABLE_I[bound];
             let text = |part: &str, preset: String| fields.get(&format!("{part}_{name}")).cloned().unwrap_or(preset);
-            let preset: Vec<String> = values.iter().map(f64::to_string).collect();
             BoundEntries {
                 name,
-                meaning: TunedBounds::MEANINGS[bound],
-                allowed: TunedBounds::in_unit(name, format_args!("{low} to {high}")),
+                meaning: bound_units::meaning(name),
+                allowed: bound_units::allowed(name),
                 tuned: fields.is_empty() || fields.contains_key(&format!("tuned_{name}")),
-                values: text("values", preset.join(", ")),
-                lengthscale: text("lengthscale", lengthscale.to_string()),
-                fixed: text("fixed", defaults[bound].to_string()),
+                values: text("values", bound_units::list(name, values)),
+                lengthscale: text("lengthscale", bound_units::entry(name, lengthscale)),
+                fixed: text("fixed", bound_units::entry(name, defaults[bound])),
             }
         };
         Ok(Self { rows: TunedBounds::NAMES.into_iter().enumerate().map(row).collect() })
@@ -67,17 +67,21 @@ impl SpaceEditor {
         for row in &self.rows {
             if !row.tuned {
                 let field = format!("fixed_{}", row.name);
-                let value = number(&field, &row.fixed, &row.allowed)?;
-                fixed.set(row.name, value).map_err(|_| Error::invalid(&field, value, &row.allowed))?;
+                let refused = || Error::invalid(&field, as_typed(&row.fixed), &row.allowed);
+                let value = bound_units::read(row.name, &row.fixed).ok_or_else(refused)?;
+                fixed.set(row.name, value).map_err(|_| refused())?;
                 continue;
             }
             let field = format!("values_{}", row.name);
-            let parts = row.values.split([',', ';', ' ']).filter(|part| !part.is_empty());
-            let values = parts.map(|part| number(&field, part, &row.allowed)).collect::<Result<Vec<f64>, _>>()?;
+            let refused = |part: String| Error::invalid(&field, as_typed(&part), &row.allowed);
+            let values = bound_units::read_list(row.name, &row.values).map_err(refused)?;
             for &value in &values {
-                fixed.clone().set(row.name, value).map_err(|_| Error::invalid(&field, value, &row.allowed))?;
+                let refused = |_| refused(bound_units::entry(row.name, value));
+                fixed.clone().set(row.name, value).map_err(refused)?;
             }
-            let lengthscale = number(&format!("lengthscale_{}", row.name), &row.lengthscale, "a number above 0")?;
+            let lengthscale = bound_units::read(row.name, &row.lengthscale).ok_or_else(|| {
+                Error::invalid(&format!("lengthscale_{}", row.name), as_typed(&row.lengthscale), "a number above 0")
+            })?;
             dimensions.push(Dimension { name: row.name.to_owned(), values, lengthscale });
         }
         let space = SearchSpace::new(dimensions).map_err(|error| match error {
@@ -89,8 +93,11 @@ impl SpaceEditor {
                 self.values_of(&dimension),
                 &format!("a valid list of values ({reason})"),
             ),
-            LearnerError::InvalidLengthscale { dimension, lengthscale, shortest, longest } => {
-                Error::invalid(&format!("lengthscale_{dimension}"), lengthscale, &format!("{shortest} to {longest}"))
+            LearnerError::InvalidLengthscale { dimension, shortest, longest, .. } => {
+                let shown = |value: f64| bound_units::number(&dimension, value);
+                let allowed = format!("{} to {}", shown(shortest), bound_units::in_unit(&dimension, longest));
+                let typed = self.rows.iter().find(|row| row.name == dimension).map_or("", |row| &row.lengthscale);
+                Error::invalid(&format!("lengthscale_{dimension}"), as_typed(typed), &allowed)
             }
             LearnerError::TooManyActions { limit } => {
                 let field = self.rows.iter().find(|row| row.tuned).map_or("a1", |row| row.name);
@@ -108,9 +115,10 @@ impl SpaceEditor {
     }
 }
 
-fn number(field: &str, text: &str, allowed: &str) -> Result<f64, Error> {
-    let value: Option<f64> = text.trim().parse().ok().filter(|value: &f64| value.is_finite());
-    value.ok_or_else(|| Error::invalid(field, text, allowed))
+/// A refused entry: a number if it is one.
+fn as_typed(text: &str) -> Value {
+    let text = text.trim();
+    text.parse::<f64>().map_or_else(|_| text.into(), Value::from)
 }
 
 #[cfg(test)]
@@ -138,7 +146,7 @@ mod tests {
 
     #[test]
     fn form_tunes_one_bound_and_fixes_another() {
-        let fields = typed(&[("tuned_a5", "on"), ("values_a5", "0; 0.02 0.04"), ("fixed_a6", "0.25")]);
+        let fields = typed(&[("tuned_a5", "on"), ("values_a5", "0; 0.02 0.04"), ("fixed_a6", "14.32")]);
         let (space, fixed) = SpaceEditor::typed(&fields).unwrap().read().unwrap();
         assert_eq!(space.dimensions().len(), 1);
         assert_eq!(space.dimensions()[0].values, [0.0, 0.02, 0.04]);
@@ -149,7 +157,7 @@ mod tests {
     fn error_gives_rounded_ends_of_the_range() {
         let fields = typed(&[("tuned_a3", "on"), ("lengthscale_a3", "0")]);
         let Err(Error::Invalid(field)) = SpaceEditor::typed(&fields).and_then(|editor| editor.read()) else { panic!() };
-        assert_eq!((field.field.as_str(), field.allowed.as_deref()), ("lengthscale_a3", Some("0.001 to 2000")));
+        assert_eq!((field.field.as_str(), field.allowed.as_deref()), ("lengthscale_a3", Some("0.001 to 2000 m/s")));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The recommended gait on the study page.
 
+use crate::bound_units;
 use crate::format;
 use crate::pages::certificate::InWords;
 use gait_optimizer::TunedBounds;
@@ -42,7 +43,7 @@ impl BestFindings {
     }
 
     pub(super) fn of(self, trial: &Trial, snapshot: &StudySnapshot) -> BestGait {
-        let limit = |(name, value): (&&'static str, f64)| (*name, format::limit_in_words(name, value));
+        let limit = |(name, value): (&&'static str, f64)| (*name, bound_units::limit_in_words(name, value));
         let passing = self.certification.passing.and_then(|id| snapshot.trial(id));
         BestGait {
             id: trial.id,
@@ -66,7 +67,7 @@ impl BestFindings {
 }
 
 /// How many answers of people prefer this gait, in words; empty if none is about it.
-fn preferred(best: &Trial, snapshot: &StudySnapshot) -> String {
+pub(in crate::pages) fn preferred(best: &Trial, snapshot: &StudySnapshot) -> String {
     let is_best = |id: TrialId| snapshot.trial(id).is_some_and(|trial| is_same_gait(trial, best));
     let by_people = snapshot
         .feedback

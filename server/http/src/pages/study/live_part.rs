@@ -8,6 +8,7 @@ use super::time_left::time_left;
 use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use super::without_gait::TrialsWithoutGait;
 use crate::AppState;
+use crate::bound_units::ANGLES;
 use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
 use crate::format;
 use crate::pages::certainty::certainty;
@@ -166,7 +167,7 @@ pub(super) async fn read_live(
     let mut without_gait = TrialsWithoutGait::of(&snapshot.trials, &explanations::in_common(&mut reader, id).await?);
     if let Some(without) = without_gait.as_mut().filter(|_| counts.converged == 0) {
         let explained = explanations::find(&mut reader, without.instance.0).await?;
-        without.conflict = explained.and_then(|made| made.explanation.headline()).unwrap_or_default();
+        without.conflict = explained.and_then(|made| made.explanation.headline(ANGLES)).unwrap_or_default();
     }
     let mut best = BestFindings::read(&mut reader, outcome.best, certification).await?;
     drop(reader);

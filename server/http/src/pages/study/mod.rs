@@ -10,6 +10,7 @@ mod trials_table;
 mod without_gait;
 
 pub(super) use self::answers_table::{AnswerRow, answer_in_words, answers, assessment_in_words};
+pub(super) use self::best_gait::preferred;
 use self::live_part::{RunningRow, read_live, running_row};
 pub(super) use self::state_buttons::post;
 use self::trials_table::TrialsQuery;

@@ -1,7 +1,9 @@
 //! The table of trials. The query string has sorting, filters and page, so the table works without scripts and can be
 //! bookmarked.
 
+use crate::bound_units;
 use crate::format::{self, words};
+use crate::paging::ListFingerprint;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_store::trial_list::{self, ListedTrial, Listing, SORTS, Start};
@@ -21,7 +23,12 @@ pub(crate) struct TrialsQuery {
     pub(super) order: String,
     state: String,
     pub(super) text: String,
-    page: u32,
+    /// Cursor of the last trial of the previous page; empty for the first page.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    after: String,
+    /// Cursor of the first trial of the next page; empty unless the table goes back.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    before: String,
     /// The trial whose gait the page shows walking, which the script sends.
     #[serde(skip_serializing)]
     pub(super) shown: String,
@@ -34,14 +41,15 @@ impl Default for TrialsQuery {
             order: DESCENDING.to_owned(),
             state: String::new(),
             text: String::new(),
-            page: 1,
+            after: String::new(),
+            before: String::new(),
             shown: String::new(),
         }
     }
 }
 
 impl TrialsQuery {
-    fn listing(&self) -> Result<Listing, Error> {
+    fn listing(&self, list: &ListFingerprint) -> Result<Listing, Error> {
         let sort = SORTS.into_iter().find(|sort| *sort == self.sort);
         let state = match self.state.as_str() {
             "" => None,
@@ -60,13 +68,28 @@ impl TrialsQuery {
             state,
             contains: self.text.trim().to_owned(),
             limit: PAGE,
-            start: Start::Skip(self.before()),
+            start: self.start(list)?,
         })
     }
 
-    /// Number of trials on the pages before this one.
-    fn before(&self) -> u32 {
-        self.page.saturating_sub(1).saturating_mul(PAGE)
+    /// The list that the cursors are about.
+    fn list(&self, study: StudyId) -> ListFingerprint {
+        let filter = [("sort", &self.sort), ("order", &self.order), ("state", &self.state), ("text", &self.text)];
+        let filter = filter.map(|(name, value)| (name.to_owned(), value.clone()));
+        ListFingerprint::of(&format!("/studies/{study}#trials"), &filter.to_vec())
+    }
+
+    fn start(&self, list: &ListFingerprint) -> Result<Start, Error> {
+        Ok(match (self.after.as_str(), self.before.as_str()) {
+            ("", "") => Start::First,
+            ("", before) => Start::Before(list.key(before)?),
+            (after, _) => Start::After(list.key(after)?),
+        })
+    }
+
+    /// The same choice on its first page.
+    fn first_page(&self) -> Self {
+        Self { after: String::new(), before: String::new(), ..self.clone() }
     }
 
     fn link(&self) -> Result<String, Error> {
@@ -77,8 +100,9 @@ impl TrialsQuery {
 
 /// A column that sorts the table.
 pub(super) struct Column {
+    pub(super) name: &'static str,
     pub(super) label: &'static str,
-    pub(super) meaning: &'static str,
+    pub(super) meaning: String,
     pub(super) numeric: bool,
     pub(super) link: String,
     /// `aria-sort` of the column; empty if the table is sorted by another one.
@@ -122,27 +146,46 @@ pub(super) struct TrialsTable {
 }
 
 impl TrialsTable {
+    /// How many columns every choice of columns has: the number and the state.
+    const ALWAYS_SHOWN: usize = 2;
+
+    /// The columns that can be left out, in the order of the table: name and label.
+    pub(super) fn optional_columns(&self) -> Vec<(&'static str, String)> {
+        let bounds = self.bounds.iter().map(|one| (one.name, format!("{}: {}", one.label, one.meaning)));
+        let values = self.values.iter().skip(Self::ALWAYS_SHOWN).map(|one| (one.name, one.label.to_owned()));
+        let warm_start = [("warm_start", "Warm start".to_owned())];
+        let reason = [("reason", "Reason".to_owned())];
+        values.chain(warm_start).chain(bounds).chain(reason).collect()
+    }
+
     pub(super) async fn read(
         db: &mut Connection,
         study: StudyId,
         counts: TrialCounts,
         choice: TrialsQuery,
     ) -> Result<Self, Error> {
-        let listing = choice.listing()?;
+        let list = choice.list(study);
+        let listing = choice.listing(&list)?;
         let listed = trial_list::of_study(db, study, &listing).await?;
-        let matching = listed.first().map_or(0, |row| row.matching);
+        let (first, last) = (listed.first(), listed.last());
+        let (before, matching) = first.map_or((0, 0), |row| (row.before, row.matching));
         let shown = u32::try_from(listed.len()).unwrap_or(PAGE);
-        let page = |page: u32| TrialsQuery { page, ..choice.clone() }.link();
-        let more = choice.before() + shown < matching;
+        let earlier = first.filter(|_| before > 0).map(|row| list.cursor(&row.place)).transpose()?;
+        let later = last.filter(|row| row.before + 1 < matching).map(|row| list.cursor(&row.place)).transpose()?;
+        let page = |page: TrialsQuery| page.link();
+        let earlier = earlier.map(|before| page(TrialsQuery { before, ..choice.first_page() })).transpose()?;
+        // Trials can leave the list while it is open, so that nothing is left on a page.
+        let is_gone = first.is_none() && !matches!(listing.start, Start::First);
+        let earlier = if is_gone { Some(page(choice.first_page())?) } else { earlier };
         Ok(Self {
             any: counts.total > 0,
             states: states(listing.state),
             values: columns(&choice, &listing, false)?,
             bounds: columns(&choice, &listing, true)?,
             extent: (matching < counts.total || shown < matching)
-                .then(|| extent(shown, choice.before(), matching, counts.total)),
-            earlier: (choice.page > 1).then(|| page(choice.page - 1)).transpose()?,
-            later: more.then(|| page(choice.page + 1)).transpose()?,
+                .then(|| extent(shown, before, matching, counts.total)),
+            earlier,
+            later: later.map(|after| page(TrialsQuery { after, ..choice.first_page() })).transpose()?,
             rows: listed.into_iter().map(trial_row).collect(),
             choice,
         })
@@ -158,12 +201,12 @@ fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
     TrialState::ALL.into_iter().map(choice).collect()
 }
 
-fn extent(shown: u32, offset: u32, matching: u32, total: u32) -> String {
+fn extent(shown: u32, before: u32, matching: u32, total: u32) -> String {
     let count = |value: u32| format::count(value);
     if shown == 0 {
         return format!("No matching trials; {} in total.", count(total));
     }
-    let (first, last) = (count(offset + 1), count(offset + shown));
+    let (first, last) = (count(before + 1), count(before + shown));
     if matching < total {
         format!("Matching trials: {first} to {last} of {}; {} in total.", count(matching), count(total))
     } else {
@@ -179,25 +222,25 @@ fn columns(choice: &TrialsQuery, listing: &Listing, bounds: bool) -> Result<Vec<
             let current = sort == listing.sort;
             let descending = current && !listing.descending;
             let order = if descending { DESCENDING } else { "ascending" };
-            let link =
-                TrialsQuery { sort: sort.to_owned(), order: order.to_owned(), page: 1, ..choice.clone() }.link()?;
+            let link = TrialsQuery { sort: sort.to_owned(), order: order.to_owned(), ..choice.first_page() }.link()?;
             let (label, meaning) = heading(sort);
             let sorted = if current { choice.order.clone() } else { String::new() };
-            Ok(Column { label, meaning, numeric: sort != "state", link, sorted })
+            Ok(Column { name: sort, label, meaning, numeric: sort != "state", link, sorted })
         })
         .collect()
 }
 
-fn heading(sort: &'static str) -> (&'static str, &'static str) {
-    match sort {
+fn heading(sort: &'static str) -> (&'static str, String) {
+    let (label, meaning) = match sort {
         "number" => ("Trial", "In the order in which they were proposed"),
         "state" => ("State", ""),
         "gait_rmse_rad" => ("RMSE, rad", "Gait RMSE against the reference gait"),
         "cost_of_transport" => ("Cost", "Cost of transport, no unit"),
         "iterations" => ("Iterations", "Interior-point iterations of the solve"),
         "seconds_total" => ("Time, s", "Wall time of the solve"),
-        bound => (bound, format::meaning(bound)),
-    }
+        bound => return (bound, bound_units::meaning(bound)),
+    };
+    (label, meaning.to_owned())
 }
 
 fn trial_row(listed: ListedTrial) -> TrialRow {
@@ -211,7 +254,7 @@ fn trial_row(listed: ListedTrial) -> TrialRow {
         iterations: listed.iterations.map_or_else(|| "–".to_owned(), |n| n.to_string()),
         seconds: format::seconds(listed.seconds_total),
         from: listed.from,
-        action: listed.action.to_array().iter().map(f64::to_string).collect(),
+        action: bound_units::bounds(&listed.action).into_iter().map(|bound| bound.value).collect(),
         reason: listed.reason,
         message: listed.message,
     }

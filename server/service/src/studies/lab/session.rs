@@ -54,7 +54,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
         state: Some(TrialState::Converged),
         contains: String::new(),
         limit,
-        start: Start::Skip(0),
+        start: Start::First,
     };
     let grounds = Grounds::read(db, study).await?;
     let mut kept: Vec<(ListedTrial, Trial)> = Vec::new();
