@@ -41,6 +41,12 @@ impl FieldError {
         }
     }
 
+    /// The same refusal with the reason, a sentence, after its own sentence.
+    #[must_use]
+    pub fn because(self, reason: &impl std::fmt::Display) -> Self {
+        Self { message: format!("{} {reason}", self.message), ..self }
+    }
+
     /// Refuses a value that the error describes instead of repeating it. `is` and `allowed` complete the sentences "it is
     /// ..." and "it must be ...".
     pub fn described(field: &str, is: &str, allowed: &str) -> Self {

@@ -5,7 +5,7 @@ use super::gait_rmse_answers::ComputedAnswer;
 use super::identical_gaits::is_same_gait;
 use super::trial_transitions::has_state;
 use super::walkable::{self, Grounds, NotWalkable, trial_of_study};
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_learner::ActionIndex;
 use gaitwright_store::blind_pairs::{self, BlindPair, OrderedAnswer};
@@ -205,14 +205,14 @@ pub(super) async fn suggest(
     }
     grounds.admit(over).map_err(|reason| reason.of_field("over", over.id))?;
     for trial in tried.iter().filter(|trial| trial.state.is_result()) {
-        let refuse = |allowed: String| Error::invalid("bounds", bounds.clone(), &allowed);
-        grounds.admit(trial).map_err(|reason| refuse(format!("the bounds of a walkable gait. {reason}")))?;
+        let refuse = |allowed: &str| FieldError::new("bounds", bounds.clone(), allowed);
+        grounds.admit(trial).map_err(|reason| refuse("the bounds of a walkable gait").because(&reason))?;
         if is_same_gait(trial, over) {
-            return Err(refuse(format!(
-                "the bounds of a different gait; trial {} already has these bounds, and its gait is the same as that of the \
-                 rated trial",
+            let reason = format!(
+                "Trial {} already has these bounds, and its gait is the same as that of the rated trial.",
                 trial.number
-            )));
+            );
+            return Err(refuse("the bounds of a different gait").because(&reason).into());
         }
         if current_answer(writer, study, (trial.id, over.id), attribution.author).await?.is_some() {
             return Err(Error::conflict(format!(

@@ -6,7 +6,7 @@
 use super::identical_gaits::is_same_gait;
 use super::safety_reports::SafetyReports;
 use super::trial_transitions::has_state;
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use gait_optimizer::Gait;
 use gaitwright_store::certificates::{self, CertificateOnRecord};
 use gaitwright_store::trials::{Trial, TrialState};
@@ -132,7 +132,7 @@ pub enum NotWalkable {
 impl NotWalkable {
     /// The error for a request field that names the trial.
     pub fn of_field(&self, field: &str, trial: TrialId) -> Error {
-        Error::invalid(field, trial.to_string(), &format!("a walkable gait. {self}"))
+        FieldError::new(field, trial.to_string(), "a walkable gait").because(self).into()
     }
 }
 
