@@ -11,7 +11,7 @@ mod reference_gait;
 
 pub use crate::opensim_reading::AngleUnit;
 pub use heel_strikes::HeelStrikes;
-pub(crate) use heel_strikes::{contacts, given};
+pub(crate) use heel_strikes::{SHORTEST_CONTACT_S, SHORTEST_SWING_S, contacts, given};
 pub use matching::{distance, nearest};
 pub use motion_recording::{MotionRecording, VerticalForce};
 pub use recorded_strides::{RecordedStride, STRIDE_RANGE_S, is_plausible, strides_between};

@@ -10,9 +10,9 @@ const NO_KNEE: &str = "the recording has no right knee angle (column knee_R_rad)
 /// Vertical force above which the foot is in contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
 /// Shortest time without contact before a heel strike, s.
-const SHORTEST_SWING_S: f64 = 0.1;
+pub(crate) const SHORTEST_SWING_S: f64 = 0.1;
 /// Shortest contact, s. Noise and vibration of an unloaded plate are shorter.
-const SHORTEST_CONTACT_S: f64 = 0.05;
+pub(crate) const SHORTEST_CONTACT_S: f64 = 0.05;
 /// Rounding error of a difference of times, s.
 pub(super) const ROUNDING_S: f64 = 1e-9;
 /// Half width of the window in which a heel strike by kinematics is the maximum, s.

@@ -8,14 +8,16 @@ use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::figures::{COURSE, StudyOutcome, StudyResults, course, have_one_reference_gait};
 use crate::format;
-use crate::page_error::{PageResult, page};
+use crate::page_error::{PageError, page};
+use crate::refused_fields::RefusedFields;
 use askama::Template;
 use axum::extract::State;
+use axum::response::{IntoResponse, Response};
 use gait_optimizer::TunedBounds;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
-use gaitwright_service::error::Error;
+use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_store::studies::{AnswerSource, Study, StudyFilter};
@@ -41,6 +43,7 @@ struct SideBySide {
     a: Option<StudyId>,
     b: Option<StudyId>,
     compared: Option<Compared>,
+    refused: RefusedFields,
 }
 
 impl SideBySide {
@@ -70,7 +73,7 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Params(choice): Params<StudiesQuery>,
-) -> PageResult {
+) -> Result<Response, PageError> {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
     let shown: BTreeSet<SubjectId> =
@@ -78,9 +81,12 @@ pub(super) async fn get(
     let mut offered = studies::page(&mut reader, reach, &StudyFilter::newest(OFFERED)).await?;
     offered.retain(|study| shown.contains(&study.plan.subject_id));
     let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
+    let mut refused = RefusedFields::default();
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {
-            return Err(Error::invalid("b", b.to_string(), "a study other than study A").into());
+            let message = "\u{201c}Study B\u{201d} is the same study as study A. Choose another one.";
+            refused = RefusedFields::of(FieldError::in_words("b", message).into())?;
+            None
         }
         (Some(a), Some(b)) => {
             let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
@@ -98,7 +104,7 @@ pub(super) async fn get(
     let other_than = |taken: Option<StudyId>| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
     let a = a.or_else(|| other_than(b));
     let b = b.or_else(|| other_than(a));
-    page(&SideBySide { offered, a, b, compared })
+    Ok((refused.status(), page(&SideBySide { offered, a, b, compared, refused })?).into_response())
 }
 
 /// Adds the best gaits.
