@@ -787,7 +787,8 @@ async fn every_form_reports_all_refused_fields_at_once() {
     service.study(|new| (new.number_of_trials, new.name) = (1, Some("Other".to_owned()))).await;
     let device = service.fetch("/api/v1/devices").await.items()[0].clone();
     let values: Vec<String> = gait_optimizer::Device::FIELDS.iter().map(|field| format!("{}=-3", field.name)).collect();
-    let fields = gait_optimizer::Device::FIELDS.map(|field| field.meaning);
+    // A page escapes apostrophes.
+    let fields = gait_optimizer::Device::FIELDS.map(|field| field.meaning.replace('\'', "&#39;"));
     for (path, form, says) in [
         (
             "/reference-gaits".to_owned(),
@@ -804,7 +805,10 @@ async fn every_form_reports_all_refused_fields_at_once() {
         (
             format!("/devices/{}", device["id"].as_str().unwrap()),
             format!("name=&{}", values.join("&")),
-            ["21 fields need correcting", "\u{201c}Name\u{201d}"].into_iter().chain(fields).collect(),
+            ["21 fields need correcting", "\u{201c}Name\u{201d}"]
+                .into_iter()
+                .chain(fields.iter().map(String::as_str))
+                .collect(),
         ),
         (
             format!("/subjects/{subject}/correct"),

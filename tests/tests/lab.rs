@@ -630,6 +630,24 @@ async fn forms_of_a_session_report_every_refused_field() {
 }
 
 #[tokio::test]
+async fn plan_offers_the_recommended_gait_first_or_names_gaits_to_certify() {
+    let (_folder, service, study, _) = finished().await;
+    let shown = service.fetch(&format!("/studies/{study}/lab")).await.text;
+    let first = shown.split_once("<option ").unwrap().1.split_once("</option>").unwrap().0;
+    assert!(first.contains("(recommended, Gait RMSE "), "{first}");
+    service.stop().await;
+
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
+    let study = service.study(|new| new.number_of_trials = 8).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let shown = service.fetch(&format!("/studies/{study}/lab")).await.text;
+    assert!(shown.contains("This study has none so far") && !shown.contains("<option"), "{shown}");
+    assert!(shown.contains("/certify\"") && shown.contains(">Certify trial "), "{shown}");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn answered_session_asks_for_no_more_walks() {
     let (_folder, service, study, trials) = finished().await;
     let session = planned(&service, study, &trials).await;
