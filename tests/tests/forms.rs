@@ -878,8 +878,8 @@ async fn names_of_studies_differ_by_more_than_capitals_at_every_way_in() {
     for name in ["Sample study (clone)", "Sample study (clone) (2)"] {
         assert_eq!(service.post(&clone(&study), &json!({})).await.json()["name"], name);
     }
-    let renamed = format!("button=save&name=SAMPLE+study&tags=&notes=");
-    let own = service.post_text(&format!("/studies/{study}/details"), FORM, &renamed).await;
+    let renamed = "button=save&name=SAMPLE+study&tags=&notes=";
+    let own = service.post_text(&format!("/studies/{study}/details"), FORM, renamed).await;
     assert_eq!(own.status, StatusCode::SEE_OTHER, "a study can change the capitals of its own name");
     service.stop().await;
 }
