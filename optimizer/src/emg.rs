@@ -26,3 +26,17 @@ pub use model_activity::{ModelActivity, model_activity};
 /// Channels of the experiment in the paper: rectus femoris, tibialis anterior, biceps femoris and gastrocnemius of the
 /// intact leg, rectus femoris and biceps femoris of the residual limb.
 pub const CHANNELS: [&str; 6] = ["RF_L", "TA_L", "BF_L", "GAS_L", "RF_R", "BF_R"];
+/// The muscles of [`CHANNELS`].
+const MUSCLES: [&str; 6] = [
+    "left rectus femoris",
+    "left tibialis anterior",
+    "left biceps femoris",
+    "left gastrocnemius",
+    "right rectus femoris",
+    "right biceps femoris",
+];
+
+/// The muscle of a channel, if it is one of [`CHANNELS`].
+pub fn muscle_of(channel: &str) -> Option<&'static str> {
+    CHANNELS.iter().zip(MUSCLES).find(|(known, _)| **known == channel).map(|(_, muscle)| muscle)
+}

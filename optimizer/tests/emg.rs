@@ -219,8 +219,8 @@ fn table_without_time_needs_a_rate_and_foot_switch_gives_heel_strikes() {
     for (refusal, expected) in refusals.iter().zip([
         "it must be \"time_s\"",
         "rate_hz is 1; it must be 100 to 20000.",
-        "column \"TA\" is missing; the columns are EMG 1, switch",
-        "no heel strike (a rise above 0.9 for at least 0.05 s, after at least 0.1 s below it)",
+        "column \"TA\" (left tibialis anterior) is missing; the columns are EMG 1, switch",
+        "no heel strike; a stride needs two. A heel strike is a rise above 0.9 that lasts at least 0.05 s, after",
         "heel_strikes_s is 9;",
     ]) {
         assert!(refusal.contains(expected), "{refusal}");

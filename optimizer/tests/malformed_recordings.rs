@@ -316,11 +316,11 @@ fn malformed_emg_files_are_rejected_with_place_and_reason() {
         EmgRecording::from_csv("emg.csv", &whole, Some(5.0)).unwrap_err(),
     ];
     let expected = [
-        "emg.csv: column \"EMG 1\" is missing; the columns are TA_L, BF_L, heel.",
+        "emg.csv: column \"EMG 1\" (left rectus femoris) is missing; the columns are TA_L, BF_L, heel.",
         "emg.csv: column \"BF_L\" is selected for both RF_L and GAS_L; each channel needs its own column.",
         "emg.csv, line 1: the file has a time column, \"time_s\"; give a sampling rate only for a file without one.",
         "emg.csv: column \"toe\" is missing; the columns are TA_L, BF_L, heel.",
-        "emg.csv: column \"heel\" has no heel strike (a rise above 2 for at least 0.05 s, after at least 0.1 s below it); a stride needs two.",
+        "emg.csv: column \"heel\" has no heel strike; a stride needs two. A heel strike is a rise above 2 that lasts at least 0.05 s, after at least 0.1 s below.",
         "heel_strikes_s is 9; it must be 0 to 0.999.",
         "emg.csv: the heel-strike times must increase.",
         "rate_hz is 5; it must be 100 to 20000.",

@@ -42,7 +42,11 @@ fn active_bounds_are_those_whose_change_changes_the_gait() {
     let solved = solve(&problem(), None, &options(), &mut |_| {}, &CancelToken::new()).unwrap();
     let found = sensitivities(&problem(), &solved.warm_start, &options()).unwrap();
     let is_active = |(bound, interval): (&BoundSensitivity, &UnchangedBound)| {
-        assert_eq!(!bound.active.is_empty(), interval.is_active(bound.value), "{bound:?} {interval:?}");
+        assert_eq!(
+            !bound.active.is_empty(),
+            interval.is_active(bound.value, &problem().settings.limits),
+            "{bound:?} {interval:?}"
+        );
         if bound.active.is_empty() {
             assert_eq!(bound.interval, (interval.least, interval.most), "{bound:?} {interval:?}");
         }

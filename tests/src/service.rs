@@ -204,7 +204,7 @@ impl Service {
         let mut new = NewStudy::of(self.subject().await);
         change(&mut new);
         let mut writer = self.store.write().await.unwrap();
-        let study = study_plan::create(&mut writer, &Actor::program(), new).await.unwrap();
+        let study = study_plan::create(&mut writer, &Actor::program(), Reach::Every, new).await.unwrap();
         commit(writer).await.unwrap();
         self.scheduler.changed();
         study.id

@@ -214,6 +214,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         let refused = service.fetch(&path).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}");
         assert!(refused.content_type().starts_with("text/html") && refused.text.contains("withdrew"), "{path}");
+        assert!(refused.text.contains("<h1>Consent withdrawn</h1>"), "{path}: {}", refused.text);
     }
     for path in ["/".to_owned(), format!("/studies/{finished}")] {
         let page = service.fetch(&path).await;

@@ -671,7 +671,7 @@ async fn refused_forms_name_fields_by_their_labels() {
     is_page(
         &refused,
         StatusCode::UNPROCESSABLE_ENTITY,
-        "\u{201c}Height, m\u{201d} is \u{201c}tall\u{201d}; it must be a number in metres, such as 1.75, or feet and inches, such as \
+        "\u{201c}Height of the measured person, m\u{201d} is \u{201c}tall\u{201d}; it must be a number in metres, such as 1.75, or feet and inches, such as \
          5 ft 9 in.",
     );
     service.stop().await;
@@ -832,6 +832,126 @@ async fn subject_form_reports_every_refused_field() {
 }
 
 #[tokio::test]
+async fn taken_pseudonym_is_reported_with_the_other_refused_fields() {
+    let (_folder, service) = service().await;
+    service.subject().await;
+    let add = async |rest: &str| service.post_text("/subjects", FORM, &format!("pseudonym=paper-1&{rest}")).await;
+    let refused = add("height_m=180&body_mass_kg=x").await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "3 fields need correcting");
+    for says in ["Choose another pseudonym", "Did you mean 1.8 m?", "\u{201c}Body mass, kg\u{201d}", "value=\"180\""] {
+        assert!(refused.text.contains(says), "{says}: {}", refused.text);
+    }
+    is_page(&add("height_m=1.8&body_mass_kg=70").await, StatusCode::CONFLICT, "Choose another pseudonym");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn every_form_reports_all_refused_fields_at_once() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let study = service.study(|new| new.number_of_trials = 1).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    service.study(|new| (new.number_of_trials, new.name) = (1, Some("Other".to_owned()))).await;
+    let device = service.fetch("/api/v1/devices").await.items()[0].clone();
+    let values: Vec<String> = gait_optimizer::Device::FIELDS.iter().map(|field| format!("{}=-3", field.name)).collect();
+    // A page escapes apostrophes.
+    let fields = gait_optimizer::Device::FIELDS.map(|field| field.meaning.replace('\'', "&#39;"));
+    for (path, form, says) in [
+        (
+            "/reference-gaits".to_owned(),
+            "name=&format=csv&recording=&height_m=180&body_mass_kg=x&heel_strikes_s=q&button=import".to_owned(),
+            vec![
+                "5 fields need correcting",
+                "\u{201c}Name\u{201d} must be",
+                "Did you mean 1.8 m?",
+                "\u{201c}Body mass, kg\u{201d} is \u{201c}x\u{201d}",
+                "\u{201c}Times of right heel strikes, s\u{201d} is \u{201c}q\u{201d}",
+                "<li>File contents",
+            ],
+        ),
+        (
+            format!("/devices/{}", device["id"].as_str().unwrap()),
+            format!("name=&{}", values.join("&")),
+            ["21 fields need correcting", "\u{201c}Name\u{201d}"]
+                .into_iter()
+                .chain(fields.iter().map(String::as_str))
+                .collect(),
+        ),
+        (
+            format!("/subjects/{subject}/correct"),
+            "height_m=17.2&body_mass_kg=700&reason=&before=0".to_owned(),
+            vec![
+                "3 fields need correcting",
+                "\u{201c}Height, m\u{201d}",
+                "\u{201c}Body mass, kg\u{201d}",
+                "\u{201c}Reason\u{201d}",
+            ],
+        ),
+        (
+            format!("/subjects/{subject}/muscles"),
+            "sol_max_force_n=strong&ta_max_force_n=-5".to_owned(),
+            vec!["2 fields need correcting", "soleus: ", "tibialis anterior: ", "value=\"strong\" placeholder"],
+        ),
+        (
+            format!("/studies/{study}/details"),
+            format!("button=save&name=other&tags={}&notes=kept", "t".repeat(41)),
+            vec![
+                "2 fields need correcting",
+                "for example \u{201c}other (2)\u{201d}",
+                "\u{201c}Tags\u{201d}",
+                "kept</textarea>",
+            ],
+        ),
+    ] {
+        let refused = service.post_text(&path, FORM, &form).await;
+        for holds in says {
+            is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, holds);
+        }
+        assert!(refused.text.contains("aria-invalid=\"true\" aria-describedby=\"refused\" autofocus"), "{path}");
+    }
+    let same = service.fetch(&format!("/studies/compare?a={study}&b={study}")).await;
+    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Study B\u{201d} is the same study as study A.");
+    assert!(same.text.contains("<select name=\"b\""), "the form is there: {}", same.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn names_of_studies_differ_by_more_than_capitals_at_every_way_in() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let new = |name: &str| json!({"subject_id": subject, "number_of_trials": 1, "muscles": false, "name": name});
+    let first = service.post("/api/v1/studies", &new("Sample study")).await;
+    assert_eq!(first.status, StatusCode::CREATED, "{}", first.text);
+    let study = first.json()["id"].as_str().unwrap().to_owned();
+    let other = service.post("/api/v1/studies", &new("Another")).await.json()["id"].as_str().unwrap().to_owned();
+    let twin = json!({"name": " sample  STUDY"});
+    for refused in [
+        service.post("/api/v1/studies", &new("sample STUDY ")).await,
+        service.post(&format!("/api/v1/studies/{other}/clone"), &twin).await,
+        service
+            .send(
+                Request::patch(format!("/api/v1/studies/{other}"))
+                    .header("content-type", "application/json")
+                    .body(Body::from(twin.to_string()))
+                    .unwrap(),
+            )
+            .await,
+    ] {
+        assert_eq!((refused.status, &refused.json()["field"]), (StatusCode::UNPROCESSABLE_ENTITY, &json!("name")));
+    }
+    let sample = made(&service.post_text("/studies/sample", FORM, "").await);
+    assert_eq!(service.get(sample).await.plan.name, "Sample study (2)");
+    let clone = |of: &str| format!("/api/v1/studies/{of}/clone");
+    for name in ["Sample study (clone)", "Sample study (clone) (2)"] {
+        assert_eq!(service.post(&clone(&study), &json!({})).await.json()["name"], name);
+    }
+    let renamed = "button=save&name=SAMPLE+study&tags=&notes=";
+    let own = service.post_text(&format!("/studies/{study}/details"), FORM, renamed).await;
+    assert_eq!(own.status, StatusCode::SEE_OTHER, "a study can change the capitals of its own name");
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn study_is_renamed_tagged_found_and_archived() {
     let (_folder, service) = service().await;
     let study = service.study(|new| new.number_of_trials = 2).await;
@@ -869,7 +989,10 @@ async fn study_is_renamed_tagged_found_and_archived() {
     let long = format!("button=save&name=x&tags={}&notes=", "t".repeat(41));
     is_page(&service.post_text(&details, FORM, &long).await, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Tags\u{201d}");
 
-    assert_eq!(service.post_text(&details, FORM, "button=archive").await.status, StatusCode::SEE_OTHER);
+    let archived = service.post_text(&details, FORM, "button=archive").await;
+    assert_eq!((archived.status, &archived.headers["location"]), (StatusCode::SEE_OTHER, &saved.headers["location"]));
+    let confirmed = service.fetch(&details).await.text;
+    assert!(confirmed.contains("Archived <time") && confirmed.contains("value=\"restore\""), "{confirmed}");
     assert_eq!((lists("").await, lists("?archived=yes").await), ([false, true], [true, false]));
     assert_eq!((rest("").await, rest("?archived=true").await), ([false, true], [true, false]));
     assert!(service.fetch(&format!("/studies/{study}")).await.status.is_success(), "it is still there");

@@ -524,7 +524,7 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
     for (body, expected) in [
         (with_heel(1, half), "recording, line 1502"),
         (with_heel(1, &whole.replace("\n1.5,", "\n1.5,x")), "recording, line 1502, column 2"),
-        (with_heel(1, &whole.replace("TA_L", "TA")), "column \\\"TA_L\\\" is missing"),
+        (with_heel(1, &whole.replace("TA_L", "TA")), "column \\\"TA_L\\\" (left tibialis anterior) is missing"),
         (with_heel(4, &whole), "1, 2 or 3"),
         (json!({"walk": 1, "recording": whole}), "at least two heel-strike times, or none if a heel strike column"),
         (
@@ -582,6 +582,87 @@ async fn incomplete_file_is_refused_with_its_line_and_changes_nothing() {
     service.post(&format!("{api}/close"), &json!({})).await;
     let closed = service.post(&format!("{api}/measurement-files/emg"), &with_heel(1, &whole)).await;
     assert!(closed.status == StatusCode::CONFLICT && closed.text.contains("The session is closed"), "{}", closed.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn forms_of_a_session_report_every_refused_field() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 1})).await;
+    let page = format!("/lab-sessions/{}", id(&session));
+    let file = electromyogram(1.0).replace("RF_L", "EMG 1").replace("TA_L", "EMG 2");
+    let typed = "heel_strikes_s=1,+x&heel_strike_column=nope&heel_strike_threshold=abc&rejected_strides=two&rate_hz=5";
+    for button in ["upload", "preview"] {
+        let form = format!("walk=1&format=csv&recording={file}&button={button}&{typed}");
+        let refused = service.post_text(&format!("{page}/measurement-files/emg"), FORM, &form).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+        for says in [
+            "\u{201c}Right heel strikes, s\u{201d} is \u{201c} x\u{201d}; it must be a number",
+            "\u{201c}Contact threshold\u{201d} is \u{201c}abc\u{201d}",
+            "\u{201c}Rejected strides\u{201d} is \u{201c}two\u{201d}",
+            "\u{201c}Sampling rate, Hz\u{201d} is 5; it must be 100 to 20",
+            "value=\"nope\"",
+        ] {
+            assert!(refused.text.contains(says), "{button}: {says}: {}", refused.text);
+        }
+        if button == "upload" {
+            let columns = "Channel columns: columns &#34;RF_L&#34; (left rectus femoris) and &#34;TA_L&#34; (left tibialis anterior)";
+            assert!(refused.text.contains(columns), "{}", refused.text);
+            assert!(refused.text.contains("Heel strike column: column &#34;nope&#34; is missing"), "{}", refused.text);
+        }
+    }
+    let kept = service.post(&format!("/api/v1{page}/measurement-files/emg"), &with_heel(1, &electromyogram(1.0))).await;
+    assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
+    let all = "band_low_hz=a&band_high_hz=5000&envelope_hz=c&order=3";
+    let refused = service.post_text(&format!("{page}/process"), FORM, all).await;
+    for says in [
+        "4 fields need correcting",
+        "\u{201c}Band-pass from, Hz\u{201d} is \u{201c}a\u{201d}",
+        "\u{201c}Band-pass to, Hz\u{201d} is 5000",
+        "\u{201c}Low-pass cut-off, Hz\u{201d} is \u{201c}c\u{201d}",
+        "\u{201c}Filter order\u{201d} is",
+        "value=\"5000\" aria-invalid",
+    ] {
+        assert!(refused.text.contains(says), "{says}: {}", refused.text);
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn plan_offers_the_recommended_gait_first_or_names_gaits_to_certify() {
+    let (_folder, service, study, _) = finished().await;
+    let shown = service.fetch(&format!("/studies/{study}/lab")).await.text;
+    let first = shown.split_once("<option ").unwrap().1.split_once("</option>").unwrap().0;
+    assert!(first.contains("(recommended, Gait RMSE "), "{first}");
+    service.stop().await;
+
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start_without_certificates(&folder.path().join("a.db"), Analytic::default()).await;
+    let study = service.study(|new| new.number_of_trials = 8).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let shown = service.fetch(&format!("/studies/{study}/lab")).await.text;
+    assert!(shown.contains("This study has none so far") && !shown.contains("<option"), "{shown}");
+    assert!(shown.contains("/certify\"") && shown.contains(">Certify trial "), "{shown}");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn answered_session_asks_for_no_more_walks() {
+    let (_folder, service, study, trials) = finished().await;
+    let session = planned(&service, study, &trials).await;
+    let (api, page) = (format!("/api/v1/lab-sessions/{}", id(&session)), format!("/lab-sessions/{}", id(&session)));
+    for walk in 1..=3 {
+        service.post(&format!("{api}/walks"), &json!({"walk": walk})).await;
+    }
+    assert!(service.fetch(&page).await.text.contains("page for the tablet"));
+    let number = service.fetch(&format!("{api}/next-walk")).await.json()["answer_number"].clone();
+    let answered = service.post(&format!("{api}/answers"), &json!({"answer": "first", "number": number})).await;
+    assert!(answered.status.is_success(), "{}", answered.text);
+    assert_eq!(service.fetch(&api).await.json()["state"], "answered");
+    service.post(&format!("{api}/unblind"), &json!({"reason": "all were walked"})).await;
+    let shown = service.fetch(&page).await.text;
+    assert!(shown.contains("answered, unblinded</span>") && !shown.contains("page for the tablet"), "{shown}");
     service.stop().await;
 }
 
@@ -663,6 +744,7 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
         "{}",
         first.text
     );
+    assert!(first.text.contains("(left rectus femoris)") && first.text.contains("at least two heel-strike times"));
     let shown =
         send(&format!("button=preview&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
     assert!(shown.text.contains("The recording can be uploaded: walk1.csv."), "{}", shown.text);
@@ -682,6 +764,9 @@ async fn emg_preview_shows_strides_and_stores_nothing_and_rejected_strides_are_l
         send(&format!("button=upload&heel_strike_column=heel&rejected_strides=2&{columns}&file_name=walk1.csv")).await;
     assert_eq!(kept.status, StatusCode::SEE_OTHER, "{}", kept.text);
     assert_eq!(files().await[0]["file_name"], "walk1.csv");
+    service.post(&format!("/api/v1/lab-sessions/{}/walks", id(&session)), &json!({"walk": 2})).await;
+    let next = service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text;
+    assert!(next.contains("1 (replaces its file)</option><option value=\"2\" selected>2</option>"), "{next}");
     let result = service.post(&format!("/api/v1/lab-sessions/{}/emg-results", id(&session)), &json!({})).await.json();
     assert_eq!(result["result"]["walks"][0]["channels"][0]["strides"], 4, "{result}");
     assert!(service.fetch(&format!("/lab-sessions/{}", id(&session))).await.text.contains(">walk1.csv</a>"));

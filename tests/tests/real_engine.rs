@@ -314,7 +314,8 @@ async fn study_in(database: &Path, change: impl FnOnce(&mut NewStudy)) -> StudyI
     let subject = subjects::by_pseudonym(&mut writer, "paper-1").await.unwrap().unwrap();
     let mut new = NewStudy { muscles: false, number_of_trials: 2, ..NewStudy::of(subject.id) };
     change(&mut new);
-    let study = study_plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), new).await.unwrap();
+    let study =
+        study_plan::create(&mut writer, &gaitwright_store::audit::Actor::program(), Reach::Every, new).await.unwrap();
     commit(writer).await.unwrap();
     store.close().await;
     study.id

@@ -139,7 +139,7 @@ async fn recommendation_states_a_failed_certificate() {
         service.fetch(&format!("/trials/{best}")).await.text.contains("Read the reasons before anyone walks with it")
     );
     let table = service.fetch(&format!("/api/v1/studies/{study}/recommendation.csv")).await.text;
-    assert!(table.starts_with("bound,value,unit,limits,certificate_of_the_gait\n"), "{table}");
+    assert!(table.starts_with("bound,side,value,unit,limits,certificate_of_the_gait\n"), "{table}");
     assert_eq!(table.matches(",failed\n").count(), 8, "{table}");
 
     let other = service.trials(study).await.into_iter().find(|trial| trial.id != best && trial.state.is_result());

@@ -178,7 +178,11 @@ async fn import_form_imports_and_keeps_the_input_after_an_error() {
     let encoded = |text: &str| text.replace('\n', "%0D%0A").replace('\t', "%09");
     let with = |forces: &str| form(&recording(), "").replace("kinematics", "force") + "&forces=" + &encoded(forces);
     let refused = service.post_text("/reference-gaits", kind, &with("not a file")).await;
-    assert!(refused.text.contains("forces, line 1: the line &#34;endheader&#34; is missing"), "{}", refused.text);
+    assert!(
+        refused.text.contains("Contents of the force file, line 1: the line &#34;endheader&#34; is missing"),
+        "{}",
+        refused.text
+    );
     assert!(refused.text.contains(">not a file</textarea>") && refused.text.contains("<details open>"), "as typed");
     let imported = service.post_text("/reference-gaits", kind, &with(&forces)).await;
     assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);

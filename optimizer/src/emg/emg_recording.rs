@@ -1,5 +1,6 @@
 //! Raw EMG signals of a file, and heel strikes in it.
 
+use super::muscle_of;
 use crate::model_error::ModelError;
 use crate::opensim_reading::StorageFile;
 use crate::reference::{SHORTEST_CONTACT_S, SHORTEST_SWING_S, contacts, given};
@@ -71,24 +72,33 @@ impl EmgRecording {
     }
 
     fn column(&self, what: &str, name: &str) -> Result<&[f64], ModelError> {
-        let known = || self.channels.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
-        let found = self.channels.iter().find(|(known, _)| known == name);
-        found.map(|(_, samples)| &samples[..]).ok_or_else(|| ModelError::Malformed {
-            what: what.to_owned(),
-            reason: format!("column {name:?} is missing; the columns are {}", known()),
-        })
+        self.find(name).ok_or_else(|| self.missing(what, &[format!("{name:?}")]))
+    }
+
+    fn find(&self, name: &str) -> Option<&[f64]> {
+        self.channels.iter().find(|(known, _)| known == name).map(|(_, samples)| &samples[..])
+    }
+
+    fn missing(&self, what: &str, columns: &[String]) -> ModelError {
+        let known = self.channels.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ");
+        let missing = match columns {
+            [one] => format!("column {one} is missing"),
+            [first @ .., last] => format!("columns {} and {last} are missing", first.join(", ")),
+            [] => String::new(),
+        };
+        ModelError::Malformed { what: what.to_owned(), reason: format!("{missing}; the columns are {known}") }
     }
 
     /// Selects columns and renames them to channels.
     ///
     /// # Errors
-    /// [`ModelError::Malformed`] for a column that is missing or selected twice.
+    /// [`ModelError::Malformed`] for columns that are missing, all of them at once, or for one that is selected twice.
     pub fn select<'a>(
         &self,
         what: &str,
         wanted: impl IntoIterator<Item = (&'a str, &'a str)>,
     ) -> Result<Self, ModelError> {
-        let mut channels = Vec::new();
+        let (mut channels, mut missing) = (Vec::new(), Vec::new());
         let mut taken: Vec<(&str, &str)> = Vec::new();
         for (channel, column) in wanted {
             if let Some((other, _)) = taken.iter().find(|(_, known)| *known == column) {
@@ -97,8 +107,15 @@ impl EmgRecording {
                 );
                 return Err(ModelError::Malformed { what: what.to_owned(), reason });
             }
-            channels.push((channel.to_owned(), self.column(what, column)?.to_vec()));
+            match (self.find(column), muscle_of(channel)) {
+                (Some(samples), _) => channels.push((channel.to_owned(), samples.to_vec())),
+                (None, Some(muscle)) => missing.push(format!("{column:?} ({muscle})")),
+                (None, None) => missing.push(format!("{column:?}")),
+            }
             taken.push((channel, column));
+        }
+        if !missing.is_empty() {
+            return Err(self.missing(what, &missing));
         }
         Ok(Self { start_s: self.start_s, rate_hz: self.rate_hz, channels })
     }
@@ -117,8 +134,8 @@ impl EmgRecording {
                 _ => "only one heel strike",
             };
             let reason = format!(
-                "column {column:?} has {found} (a rise above {threshold} for at least {SHORTEST_CONTACT_S} s, after at least \
-                 {SHORTEST_SWING_S} s below it); a stride needs two"
+                "column {column:?} has {found}; a stride needs two. A heel strike is a rise above {threshold} that lasts at least \
+                 {SHORTEST_CONTACT_S} s, after at least {SHORTEST_SWING_S} s below"
             );
             return Err(ModelError::Malformed { what: what.to_owned(), reason });
         }

@@ -16,6 +16,7 @@ use super::rows::HeightRow;
 use super::variable_bounds::{ActiveLimits, VariableBounds, variable_bounds};
 use crate::body::GRAVITY;
 use crate::gait::Gait;
+use crate::settings::GaitLimits;
 use crate::tuned_bounds::TunedBounds;
 use interior_point::{NonlinearProgram, WarmPoint};
 use serde::{Deserialize, Serialize};
@@ -40,13 +41,13 @@ impl UnchangedBound {
         self.least.is_none_or(|least| least <= value) && self.most.is_none_or(|most| value <= most)
     }
 
-    /// Whether the bound, which has this value, is active: the gait changes with small changes of it, or when it is loosened. A
-    /// bound below the tolerance of its limit is loosened only beyond that tolerance. At an end of the range of the bound, one end
-    /// of the interval is open.
-    pub fn is_active(&self, value: f64) -> bool {
-        let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
-        let loosest = if is_lower { self.least } else { self.most };
-        loosest.is_some() || [self.least, self.most].contains(&Some(value))
+    /// Whether the bound, which has this value, is active: small changes of it change the gait. At an end of the range of the
+    /// bound, one end of the interval is open. A torso lean below its tolerance acts as the tolerance.
+    pub fn is_active(&self, value: f64, limits: &GaitLimits) -> bool {
+        let tolerance = limits.torso_tolerance_rad;
+        let acts_as_tolerance =
+            self.bound == "a6" && value < tolerance && self.most.is_some_and(|most| most <= tolerance);
+        acts_as_tolerance || [self.least, self.most].contains(&Some(value))
     }
 }
 

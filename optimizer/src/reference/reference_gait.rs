@@ -183,7 +183,11 @@ pub struct MeasuredPerson {
 }
 
 impl MeasuredPerson {
-    pub(super) fn validate(&self) -> Result<(), ModelError> {
+    /// Checks height and mass.
+    ///
+    /// # Errors
+    /// [`ModelError::OutOfRange`] with the field.
+    pub fn validate(&self) -> Result<(), ModelError> {
         for (field, value, (low, high)) in [
             ("height_m", self.height_m, Subject::HEIGHT_RANGE_M),
             ("body_mass_kg", self.body_mass_kg, Subject::BODY_MASS_RANGE_KG),

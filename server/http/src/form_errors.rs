@@ -74,6 +74,11 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
     near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
 }
 
+/// A refusal under the label that its form has for the field, or else under the common one.
+pub(crate) fn of_labelled(label: Option<&str>, fault: &FieldError) -> String {
+    label.map_or_else(|| labelled(fault, &[]), |label| of_field(label, fault))
+}
+
 /// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
 fn near_miss(fault: &FieldError) -> Option<String> {
     let number = match fault.value.as_ref()? {

@@ -8,7 +8,7 @@ use axum::http::{Method, StatusCode, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
 use gaitwright_service::access::Role;
 use gaitwright_service::error::Error;
-use gaitwright_store::StudyId;
+use gaitwright_store::{StoreError, StudyId};
 
 /// An error of a page handler.
 #[derive(Debug)]
@@ -58,6 +58,16 @@ fn without_identifier(detail: &str) -> Option<String> {
     Some(format!("There is no such {what}, or you have no access to it."))
 }
 
+/// A heading for people, where that of the kind has words of HTTP.
+fn title(status: StatusCode, detail: &str) -> Option<&'static str> {
+    match status {
+        StatusCode::CONFLICT if detail == StoreError::Withdrawn.to_string() => Some("Consent withdrawn"),
+        StatusCode::CONFLICT => Some("Not possible at present"),
+        StatusCode::UNPROCESSABLE_ENTITY => Some("An entry is not accepted"),
+        _ => None,
+    }
+}
+
 /// Renders a problem as a page with the navigation of the caller.
 pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
     let status = problem.status();
@@ -67,7 +77,8 @@ pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
         None if status == StatusCode::METHOD_NOT_ALLOWED => "There is no page at this address.".to_owned(),
         None => problem.detail.clone(),
     };
-    let problem = Problem { detail, ..problem };
+    let title = title(status, &detail).unwrap_or(problem.title);
+    let problem = Problem { title, detail, ..problem };
     match (ErrorPage { problem, to }).render() {
         Ok(text) => (status, Html(text)).into_response(),
         Err(_) => status.into_response(),

@@ -35,7 +35,7 @@ fn prints(c: char) -> bool {
 /// [`Error::Invalid`] for an empty name, more than `longest` characters, or a character that does not print.
 pub fn name<'a>(field: &str, text: &'a str, longest: usize) -> Result<&'a str, Error> {
     let trimmed = text.trim();
-    if person(trimmed).is_empty() || trimmed.chars().count() > longest || !trimmed.chars().all(prints) {
+    if compared(trimmed).is_empty() || trimmed.chars().count() > longest || !trimmed.chars().all(prints) {
         return Err(Error::invalid(field, text, &format!("1 to {longest} printable characters")));
     }
     Ok(trimmed)
@@ -75,9 +75,9 @@ pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a s
     Ok(text)
 }
 
-/// The form of a name that identifies a person: upper and lower case, spaces, invisible characters and the way in which
-/// accents are encoded make no difference.
-pub(crate) fn person(name: &str) -> String {
+/// The form in which names are compared: upper and lower case, spaces, invisible characters and the way in which accents are
+/// encoded make no difference.
+pub(crate) fn compared(name: &str) -> String {
     let invisible = CodePointSetData::new::<DefaultIgnorableCodePoint>();
     let visible: String = name.nfkc().filter(|c| !invisible.contains(*c)).collect();
     visible.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase().to_lowercase()
@@ -85,7 +85,7 @@ pub(crate) fn person(name: &str) -> String {
 
 /// Whether two names are of one person.
 pub(crate) fn is_same_name(one: &str, other: &str) -> bool {
-    person(one) == person(other)
+    compared(one) == compared(other)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! An interrupted run continues: the command finds its unfinished study in the record.
 
 use super::output::tell;
+use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::audit::Actor;
@@ -10,7 +11,7 @@ use gaitwright_store::{Store, commit, studies, trials};
 /// The unfinished study with the same settings, or a new one.
 pub(super) async fn resumed_or_new(store: &Store, new: NewStudy) -> Result<Study, Error> {
     let mut writer = store.write().await?;
-    let wanted = study_plan::checked(&mut writer, new.clone()).await?;
+    let wanted = study_plan::checked(&mut writer, Reach::Every, new.clone()).await?;
     let unfinished =
         studies::active(&mut writer).await?.into_iter().find(|study| study.plan.has_same_trials_as(&wanted));
     let study = if let Some(study) = unfinished {
@@ -19,7 +20,7 @@ pub(super) async fn resumed_or_new(store: &Store, new: NewStudy) -> Result<Study
         tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.number_of_trials));
         study
     } else {
-        study_plan::create(&mut writer, &Actor::terminal(), new).await?
+        study_plan::create(&mut writer, &Actor::terminal(), Reach::Every, new).await?
     };
     commit(writer).await?;
     Ok(study)

@@ -240,6 +240,7 @@ async fn archive_with_different_content_for_a_known_identifier_is_refused() {
 async fn study_of_a_built_in_subject_is_imported_into_a_record_with_that_subject() {
     let (folder, service, study, file) = study().await;
     let there = service.subject().await;
+    let name = service.get(study).await.plan.name;
     service.stop().await;
     let other = Service::start(&folder.path().join("b.db"), Consistent::default(), 1).await;
     let here = other.subject().await;
@@ -248,8 +249,10 @@ async fn study_of_a_built_in_subject_is_imported_into_a_record_with_that_subject
     rows.first("subjects")["notes"] = json!("another person");
     let refusal = import(&other.store, &rows.packed()).await.unwrap_err().to_string();
     assert!(refusal.contains("has the name \"paper-"), "{refusal}");
+    other.study(|new| (new.number_of_trials, new.name) = (1, Some(name.to_uppercase()))).await;
     assert_eq!(import(&other.store, &file).await.unwrap(), study);
-    assert_eq!(other.get(study).await.plan.subject_id, here);
+    let imported = other.get(study).await.plan;
+    assert_eq!((imported.subject_id, imported.name), (here, format!("{name} (2)")), "names stay unique");
     other.stop().await;
 }
 

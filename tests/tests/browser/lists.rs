@@ -36,7 +36,9 @@ async fn browser_renames_finds_and_archives_a_study() {
     }
     let page = browser.open(&site.at(&format!("/studies/{study}/details"))).await;
     page.click("button[value=archive]").await;
-    page.wait_until("location.pathname === '/'").await;
+    page.wait_for("button[value=restore]").await;
+    page.is_clean(&site.origin).await;
+    let page = browser.open(&site.at("/")).await;
     assert!(!page.text("main").await.contains("Visit 3"));
     page.is_clean(&site.origin).await;
     browser.close().await;

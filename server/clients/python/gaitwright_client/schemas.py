@@ -83,9 +83,9 @@ JointAngleFormat = Literal["opensim", "camargo", "csv"]
 # Identifier of a lab session.
 LabSessionId = str
 
-# State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
-# session accepts no more data.
-LabSessionState = Literal["planned", "under_way", "closed"]
+# State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `answered`, the
+# subject has answered, so no walk is left; `closed`, the session accepts no more data.
+LabSessionState = Literal["planned", "under_way", "answered", "closed"]
 
 # Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too;
 # `not_executable`, it found a gait whose simulated walks are too short for the study, which is a result like
@@ -2230,7 +2230,7 @@ class NewStudy(_NewStudyRequired, total=False):
     # Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
     # C4).
     muscles: bool
-    # Name shown to users. Made from subject and variant by default.
+    # Name shown to users, which no other study that you can see has. Made from subject and variant by default.
     name: Optional[str]
     # Number of trials.
     number_of_trials: int
@@ -3120,7 +3120,7 @@ class StudyChange(TypedDict, total=False):
     # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
     # before its start and after its end.
     archived: Optional[bool]
-    # Name shown to users.
+    # Name shown to users, which no other study that you can see has.
     name: Optional[str]
     # Free-text notes.
     notes: Optional[str]
@@ -3139,7 +3139,7 @@ class StudyClone(TypedDict, total=False):
     answer_source: Optional[AnswerSource]
     # Whether to solve with muscles.
     muscles: Optional[bool]
-    # Name shown to users.
+    # Name shown to users, which no other study that you can see has. That of the parent and "(clone)" by default.
     name: Optional[str]
     # Number of trials.
     number_of_trials: Optional[int]

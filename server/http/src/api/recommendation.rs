@@ -107,7 +107,7 @@ pub(super) async fn of_study(
 
 /// Download the recommended bounds as CSV
 ///
-/// Each bound with its unit and what it limits.
+/// Each bound with its side (`at least` or `at most`), its unit and what it limits.
 #[utoipa::path(
     get,
     path = "/studies/{id}/recommendation.csv",
@@ -131,10 +131,11 @@ pub(super) async fn of_study_csv(
 }
 
 fn written(bounds: &TunedBounds, certificate: CertificateState) -> CsvTable {
-    let bounds = TunedBounds::NAMES.iter().zip(bounds.to_array()).zip(TunedBounds::UNITS).zip(TunedBounds::QUANTITIES);
-    let mut table = CsvTable::new(["bound", "value", "unit", "limits", "certificate_of_the_gait"]);
-    for (((name, value), unit), limited) in bounds {
-        table.row(cells![*name, value, unit, limited, certificate.as_str()]);
+    let mut table = CsvTable::new(["bound", "side", "value", "unit", "limits", "certificate_of_the_gait"]);
+    for (place, value) in bounds.to_array().into_iter().enumerate() {
+        let (name, unit) = (TunedBounds::NAMES[place], TunedBounds::UNITS[place]);
+        let side = if TunedBounds::IS_LOWER[place] { "at least" } else { "at most" };
+        table.row(cells![name, side, value, unit, TunedBounds::QUANTITIES[place], certificate.as_str()]);
     }
     table
 }

@@ -291,7 +291,7 @@ pub(super) async fn patch(
         Err(before) => return Ok(before),
     };
     expected.check(studies::get(&mut writer, id).await?.revision)?;
-    let study = study_change::change(&mut writer, &request.actor, id, &new).await?;
+    let study = study_change::change(&mut writer, &request.actor, request.caller.reach(), id, &new).await?;
     let revision = study.revision;
     let view = StudyView::of(&mut writer, study).await?;
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
@@ -349,7 +349,7 @@ pub(super) async fn clone_study(
         Ok(writer) => writer,
         Err(before) => return Ok(before),
     };
-    let study = study_clone::clone_study(&mut writer, &request.actor, id, &differs).await?;
+    let study = study_clone::clone_study(&mut writer, &request.actor, request.caller.reach(), id, &differs).await?;
     made(&app, &request, writer, study).await
 }
 

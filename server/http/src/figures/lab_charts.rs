@@ -1,22 +1,13 @@
 //! The charts of a lab session: muscle activity over the cycle, limit cycles.
 
 use gait_optimizer::Gait;
-use gait_optimizer::emg::CycleActivity;
+use gait_optimizer::emg::{CHANNELS, CycleActivity, muscle_of};
 use gait_optimizer::limit_cycle::JOINTS;
 use gaitwright_charts::gait_charts;
 use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_service::studies::lab::{EmgView, LabSessionView, LimitCycles, WalkCondition};
 
 const CYCLE: &str = "gait cycle from right heel strike, %";
-/// Names of the EMG channels.
-const MUSCLES: [(&str, &str); 6] = [
-    ("RF_L", "left rectus femoris"),
-    ("TA_L", "left tibialis anterior"),
-    ("BF_L", "left biceps femoris"),
-    ("GAS_L", "left gastrocnemius"),
-    ("RF_R", "right rectus femoris"),
-    ("BF_R", "right biceps femoris"),
-];
 /// Names of the joints, in the order of [`JOINTS`] and of the gait's coordinates after the hip position.
 const JOINT_NAMES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
@@ -34,12 +25,12 @@ pub(crate) fn walk_name(session: &LabSessionView, walk: u8) -> String {
 
 /// The name of a channel.
 pub(crate) fn muscle_name(channel: &str) -> &str {
-    MUSCLES.iter().find(|(known, _)| *known == channel).map_or(channel, |(_, name)| name)
+    muscle_of(channel).unwrap_or(channel)
 }
 
 /// Each EMG channel and its muscle.
 pub(crate) fn muscles() -> [(&'static str, &'static str); 6] {
-    MUSCLES
+    CHANNELS.map(|channel| (channel, muscle_name(channel)))
 }
 
 /// The name of a joint, one of [`JOINTS`].

@@ -7,17 +7,18 @@ use crate::extractors::{Form, FormFields};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm};
 use askama::Template;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::{Device as Definition, DeviceField};
 use gaitwright_service::access::{Read, RequiredRight, Run};
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::device;
 use gaitwright_store::devices::{self, Device};
 use gaitwright_store::{DeviceId, commit};
 use serde_json::{Map, Value, json};
+use std::ops::ControlFlow;
 
 #[derive(Template)]
 #[template(path = "device.html")]
@@ -27,7 +28,7 @@ struct DevicePage {
     name: String,
     carried_limb: bool,
     may_run: bool,
-    refused: Option<FieldError>,
+    refused: RefusedFields,
 }
 
 struct DeviceRow {
@@ -47,7 +48,7 @@ impl DevicePage {
         };
         let rows = Definition::FIELDS.iter().map(of_device).collect();
         let (name, carried_limb) = (device.name.clone(), device.definition.carried_limb);
-        Self { device, rows, name, carried_limb, may_run, refused: None }
+        Self { device, rows, name, carried_limb, may_run, refused: RefusedFields::default() }
     }
 
     fn file_name(&self) -> String {
@@ -55,24 +56,40 @@ impl DevicePage {
     }
 
     /// The entries of a refused form.
-    fn refusing(mut self, fields: &FormFields, refused: FieldError) -> Self {
+    fn refusing(mut self, fields: &FormFields, refused: RefusedFields) -> Self {
         for row in &mut self.rows {
             row.value = fields.get(row.field.name).cloned().unwrap_or_default();
         }
         self.name = fields.get("name").cloned().unwrap_or_default();
         self.carried_limb = fields.contains_key("carried_limb");
-        let name = refused.field.trim_start_matches("device.");
-        let label = Definition::FIELDS.iter().find(|field| field.name == name).map(|field| field.meaning);
-        let message = match label {
-            Some(label) => form_errors::of_field(label, &refused),
-            None => form_errors::in_words(&refused.clone().into()),
-        };
-        self.refused = Some(FieldError { message, ..refused });
+        self.refused = refused;
         self
     }
+}
 
-    fn refuses(&self, field: &str) -> bool {
-        self.refused.as_ref().is_some_and(|refused| refused.field.trim_start_matches("device.") == field)
+/// The form as typed, and the device from which a new one is derived.
+#[derive(Debug, Clone)]
+struct DerivedDevice {
+    before: Definition,
+    fields: FormFields,
+}
+
+impl TypedForm for DerivedDevice {
+    fn labels(&self) -> Vec<(String, String)> {
+        let quantities = Definition::FIELDS.iter().map(|field| (field.name.to_owned(), field.meaning.to_owned()));
+        [("name".to_owned(), "Name".to_owned())].into_iter().chain(quantities).collect()
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        let quantity = Definition::FIELDS.iter().find(|known| known.name == field);
+        let value = match quantity {
+            Some(known) => (known.value)(&self.before).to_string(),
+            // A name that no device has.
+            None if field == "name" => DeviceId::fresh().to_string(),
+            None => return false,
+        };
+        self.fields.insert(field.to_owned(), value);
+        true
     }
 }
 
@@ -93,27 +110,33 @@ pub(super) async fn post(
     Id(id, _): Id<DeviceId, Run>,
     Form(fields): Form<FormFields>,
 ) -> Result<Response, PageError> {
-    let before = devices::get(&mut *app.read().await?, id).await?;
     let mut writer = app.write().await?;
-    let added = match changed(&before.definition, &fields) {
-        Ok(definition) => device::add(&mut writer, &authorized.caller.actor, &definition).await,
-        Err(error) => Err(error),
+    let before = devices::get(&mut writer, id).await?;
+    let mut check = FormCheck::new(&DerivedDevice { before: before.definition.clone(), fields: fields.clone() });
+    let definition = loop {
+        let read = async {
+            let definition = changed(check.form())?;
+            device::check_new(&mut writer, &definition).await?;
+            Ok(definition)
+        }
+        .await;
+        if let ControlFlow::Break(definition) = check.step(read)? {
+            break definition;
+        }
     };
-    match added {
-        Ok((added, _)) => {
-            commit(writer).await?;
-            Ok(Redirect::to(&format!("/devices/{}", added.id)).into_response())
-        }
-        Err(Error::Invalid(refused)) => {
-            let form = page(&DevicePage::of(before, true).refusing(&fields, *refused))?;
-            Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
-        }
-        Err(other) => Err(other.into()),
+    let refused = check.into_refused();
+    if let Some(definition) = definition.filter(|_| refused.is_empty()) {
+        let (added, _) = device::add(&mut writer, &authorized.caller.actor, &definition).await?;
+        commit(writer).await?;
+        return Ok(Redirect::to(&format!("/devices/{}", added.id)).into_response());
     }
+    drop(writer);
+    let status = refused.status();
+    Ok((status, page(&DevicePage::of(before, true).refusing(&fields, refused))?).into_response())
 }
 
 /// The device with the entries. A changed value loses its source, which belongs to the old value.
-fn changed(before: &Definition, fields: &FormFields) -> Result<Definition, Error> {
+fn changed(DerivedDevice { before, fields }: &DerivedDevice) -> Result<Definition, Error> {
     let known = |name: &str| Definition::FIELDS.iter().any(|field| field.name == name);
     if let Some(name) = fields.keys().find(|name| !known(name) && !matches!(name.as_str(), "name" | "carried_limb")) {
         return Err(form_errors::unknown_field(name).into());

@@ -1,6 +1,6 @@
-//! The pages of lab sessions: the list of a study with the form to plan one, and each session with its walks.
+//! The page of a lab session with its walks and measurements.
 
-use super::lab_session_state::{is_complete, state_in_words};
+use super::lab_session_state::state_in_words;
 use super::measurement_forms::{FilterFields, Forms};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
@@ -9,10 +9,9 @@ use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
-use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::RefusedFields;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -23,121 +22,12 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, EmgView, LabSessionView, MeasurementFormat, NewLabSession, WalkActivity, WalkCondition, WalkView,
+    self, EmgView, LabSessionState, LabSessionView, MeasurementFormat, WalkActivity, WalkCondition, WalkView,
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::trial_list::ListedTrial;
-use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies, trials};
+use gaitwright_store::{LabSessionId, TrialId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
-
-/// How many converged trials the form considers, lowest Gait RMSE first.
-const OFFERED: u32 = 200;
-
-#[derive(Template)]
-#[template(path = "lab_sessions.html")]
-struct SessionsPage {
-    study: Study,
-    /// The sessions, with name in the lab and state.
-    sessions: Vec<(LabSessionView, String, String)>,
-    /// Different walkable gaits of the study, lowest Gait RMSE first, with their labels.
-    gaits: Vec<(TrialId, String)>,
-    may_run: bool,
-    fields: LabSessionFields,
-    refused: Option<String>,
-}
-
-impl SessionsPage {
-    fn is(chosen: &str, gait: &TrialId) -> bool {
-        chosen == gait.to_string()
-    }
-}
-
-/// The fields as typed, to show a refused form again.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct LabSessionFields {
-    trial_a: String,
-    trial_b: String,
-    notes: String,
-}
-
-impl LabSessionFields {
-    fn read(&self) -> Result<NewLabSession, Error> {
-        let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait from the list"));
-        Ok(NewLabSession {
-            trial_a: gait("trial_a", &self.trial_a)?,
-            trial_b: gait("trial_b", &self.trial_b)?,
-            notes: self.notes.clone(),
-        })
-    }
-}
-
-/// `GET /studies/{id}/lab`.
-pub(super) async fn list(
-    authorized: Authorized<Read>,
-    State(app): State<AppState>,
-    Visible(id, _): Visible<StudyId, Read>,
-) -> PageResult {
-    show_list(&app, id, authorized.caller.may(Run::NEEDED), LabSessionFields::default(), None).await
-}
-
-async fn show_list(
-    app: &AppState,
-    id: StudyId,
-    may_run: bool,
-    fields: LabSessionFields,
-    refused: Option<String>,
-) -> PageResult {
-    let mut reader = app.read().await?;
-    let study = studies::get(&mut reader, id).await?;
-    let sessions = lab_sessions::of_study(&mut reader, id).await?;
-    let gaits = lab::gaits_to_plan_with(&mut reader, id, OFFERED).await?;
-    drop(reader);
-    let named = |trial: ListedTrial| {
-        (trial.id, format!("trial {} (Gait RMSE {} rad)", trial.number, format::decimal(trial.gait_rmse_rad)))
-    };
-    let shown = |session| {
-        let view = LabSessionView::from(&session);
-        let (name_in_lab, state) = (lab::name_in_lab(view.id), state_in_words(&view));
-        (view, name_in_lab, state)
-    };
-    page(&SessionsPage {
-        study,
-        sessions: sessions.into_iter().map(shown).collect(),
-        gaits: gaits.into_iter().map(named).collect(),
-        may_run,
-        fields,
-        refused,
-    })
-}
-
-/// The labels of the form that plans a session.
-const LABELS: [(&str, &str); 3] = [("trial_a", "Gait A"), ("trial_b", "Gait B"), ("notes", "Notes")];
-
-/// `POST /studies/{id}/lab`.
-pub(super) async fn plan(
-    authorized: Authorized<Run>,
-    State(app): State<AppState>,
-    Id(id, _): Id<StudyId, Run>,
-    Form(fields): Form<LabSessionFields>,
-) -> Result<Response, PageError> {
-    let planned = async {
-        let new = fields.read()?;
-        let mut writer = app.write().await?;
-        let session = lab::plan(&mut writer, &authorized.caller.actor, id, &new).await?;
-        commit(writer).await?;
-        Ok(session.id)
-    };
-    match planned.await {
-        Ok(session) => Ok(Redirect::to(&format!("/lab-sessions/{session}")).into_response()),
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let form = show_list(&app, id, true, fields, Some(form_errors::of_form(&error, &LABELS))).await?;
-            Ok((Problem::from(&error).status(), form).into_response())
-        }
-        Err(other) => Err(other.into()),
-    }
-}
 
 #[derive(Template)]
 #[template(path = "lab_session.html")]
@@ -150,23 +40,35 @@ struct SessionPage {
     may_run: bool,
     may_unblind: bool,
     /// Recorded walks, for which files can be uploaded.
-    recorded: Vec<u8>,
+    recorded: Vec<UploadWalk>,
     recordings: Vec<MeasurementFile>,
     has_emg: bool,
     forms: Forms,
     filters: FilterFields,
     measured: Option<MeasuredActivity>,
     limit_cycles: Vec<PageChart>,
-    refused: Option<String>,
+    refused: RefusedFields,
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
     session: LabSessionView,
 }
 
-impl SessionPage {
-    /// Whether nothing is left to do on the tablet.
-    fn is_complete(&self) -> bool {
-        is_complete(&self.session)
+/// A recorded walk, and which kinds of files it has.
+struct UploadWalk {
+    number: u8,
+    has_emg: bool,
+    has_joint_angles: bool,
+}
+
+impl UploadWalk {
+    fn all(session: &LabSessionView, files: &[MeasurementFile]) -> Vec<Self> {
+        let recorded = session.walks.iter().filter(|walk| walk.recorded.is_some());
+        let of_walk = |walk: &WalkView| {
+            let has = |kind| files.iter().any(|file| file.walk == walk.number && file.kind == kind);
+            let (has_emg, has_joint_angles) = (has(MeasurementKind::Emg), has(MeasurementKind::JointAngles));
+            Self { number: walk.number, has_emg, has_joint_angles }
+        };
+        recorded.map(of_walk).collect()
     }
 }
 
@@ -260,7 +162,7 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
 ) -> PageResult {
-    show(&mut app, id, &authorized.caller, Forms::default(), None).await
+    show(&mut app, id, &authorized.caller, Forms::default(), RefusedFields::default()).await
 }
 
 /// The charts of a session.
@@ -274,7 +176,7 @@ pub(super) async fn show(
     id: LabSessionId,
     caller: &Caller,
     mut forms: Forms,
-    refused: Option<String>,
+    refused: RefusedFields,
 ) -> PageResult {
     let emg = lab::emg(app.store_mut(), id).await?;
     let cycles = measured_cycles(app.store_mut(), id).await?;
@@ -293,16 +195,14 @@ pub(super) async fn show(
         (session, emg, drawings)
     };
     let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
-    let recorded: Vec<u8> =
-        session.walks.iter().filter(|walk| walk.recorded.is_some()).map(|walk| walk.number).collect();
-    // The newest file of each kind is used, so an upload begins with a walk that has none.
-    let has_file = |walk: u8, kind| recordings.iter().any(|file| file.kind == kind && file.walk == walk);
-    let next = |kind| recorded.iter().copied().find(|walk| !has_file(*walk, kind)).unwrap_or_default();
-    if forms.emg.walk == 0 {
-        forms.emg.walk = next(MeasurementKind::Emg);
+    let recorded = UploadWalk::all(&session, &recordings);
+    // The form offers the next walk without a file: the newest file of a walk replaces earlier ones.
+    let next = |has: fn(&UploadWalk) -> bool| recorded.iter().find(|walk| !has(walk)).map_or(0, |walk| walk.number);
+    if forms.open != "emg" {
+        forms.emg.walk = next(|walk| walk.has_emg);
     }
-    if forms.joint_angles.walk == 0 {
-        forms.joint_angles.walk = next(MeasurementKind::JointAngles);
+    if forms.open != "joint_angles" {
+        forms.joint_angles.walk = next(|walk| walk.has_joint_angles);
     }
     page(&SessionPage {
         study,
@@ -360,8 +260,8 @@ pub(super) async fn close(
         lab::close(&mut writer, &authorized.caller.actor, id, &note).await?;
         Ok(commit(writer).await?)
     };
-    let done = done.await;
-    answer(&mut app, id, &authorized.caller, done, Forms::default()).await
+    let refused = done.await.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))?;
+    answer(&mut app, id, &authorized.caller, refused, Forms::default()).await
 }
 
 /// `POST /lab-sessions/{id}/unblind`.
@@ -376,26 +276,22 @@ pub(super) async fn unblind(
         lab::unblind(&mut writer, &authorized.caller.actor, id, &note).await?;
         Ok(commit(writer).await?)
     };
-    let done = done.await;
+    let refused = done.await.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))?;
     // The learner may have a new preference.
     app.scheduler.changed();
-    answer(&mut app, id, &authorized.caller, done, Forms::default()).await
+    answer(&mut app, id, &authorized.caller, refused, Forms::default()).await
 }
 
-/// Shows the session again after a change, with the reason if it was refused.
+/// Shows the session again after a change, with the reasons if it was refused.
 pub(super) async fn answer(
     app: &mut AppState,
     id: LabSessionId,
     caller: &Caller,
-    done: Result<(), Error>,
+    refused: RefusedFields,
     forms: Forms,
 ) -> Result<Response, PageError> {
-    match done {
-        Ok(()) => Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response()),
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, caller, forms, Some(form_errors::in_words(&error))).await?;
-            Ok((Problem::from(&error).status(), shown).into_response())
-        }
-        Err(other) => Err(other.into()),
+    if refused.is_empty() {
+        return Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response());
     }
+    Ok((refused.status(), show(app, id, caller, forms, refused).await?).into_response())
 }

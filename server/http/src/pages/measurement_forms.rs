@@ -1,6 +1,7 @@
 //! The forms of a lab session for measurement files and filter settings, as typed, and their parsed values.
 
 use super::recording_preview::RecordingPreview;
+use crate::refused_fields::{RefusedFields, TypedForm, labels_of};
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles};
@@ -85,6 +86,34 @@ impl EmgFields {
             recording: self.recording.clone(),
             reading: EmgReading { heel_strike_threshold, ..reading },
         })
+    }
+}
+
+impl TypedForm for EmgFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[
+            ("walk", "Walk"),
+            ("rate_hz", "Sampling rate, Hz"),
+            ("recording", "File contents"),
+            ("channels", "Channel columns"),
+            ("heel_strikes_s", "Right heel strikes, s"),
+            ("heel_strike_column", "Heel strike column"),
+            ("heel_strike_threshold", "Contact threshold"),
+            ("rejected_strides", "Rejected strides"),
+            ("file_name", "File name"),
+        ])
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "rate_hz" => self.rate_hz.clear(),
+            "channels" => self.channels.clear(),
+            "heel_strikes_s" => self.heel_strikes_s.clear(),
+            "heel_strike_threshold" => self.heel_strike_threshold.clear(),
+            "rejected_strides" => self.rejected_strides.clear(),
+            _ => return false,
+        }
+        true
     }
 }
 
@@ -208,6 +237,27 @@ impl JointAngleFields {
     }
 }
 
+impl TypedForm for JointAngleFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[
+            ("walk", "Walk"),
+            ("unit", "Angle unit of an OpenSim file"),
+            ("cutoff_hz", "Low-pass cut-off, Hz"),
+            ("file_name", "File name"),
+            ("recording", "File contents"),
+        ])
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "unit" => self.unit.clear(),
+            "cutoff_hz" => self.cutoff_hz.clear(),
+            _ => return false,
+        }
+        true
+    }
+}
+
 /// The filter settings, as typed.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -219,13 +269,48 @@ pub(super) struct FilterFields {
 }
 
 impl FilterFields {
-    pub(super) fn read(&self) -> Result<EmgSettings, Error> {
+    fn read(&self) -> Result<EmgSettings, Error> {
         Ok(EmgSettings {
             band_low_hz: number("band_low_hz", &self.band_low_hz)?,
             band_high_hz: number("band_high_hz", &self.band_high_hz)?,
             envelope_hz: number("envelope_hz", &self.envelope_hz)?,
             order: number("order", &self.order)?,
         })
+    }
+}
+
+/// The highest sampling rate of a recording, at which the settings have their widest ranges, Hz.
+const HIGHEST_RATE_HZ: f64 = 20_000.0;
+
+impl FilterFields {
+    /// The settings, as far as they can be checked without a recording.
+    pub(super) fn read_and_check(&self) -> Result<EmgSettings, Error> {
+        let settings = self.read()?;
+        settings.validate(HIGHEST_RATE_HZ)?;
+        Ok(settings)
+    }
+}
+
+impl TypedForm for FilterFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[
+            ("band_low_hz", "Band-pass from, Hz"),
+            ("band_high_hz", "Band-pass to, Hz"),
+            ("envelope_hz", "Low-pass cut-off, Hz"),
+            ("order", "Filter order"),
+        ])
+    }
+
+    /// The widest band, so that the other edge is not refused because of it.
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "band_low_hz" => "1".clone_into(&mut self.band_low_hz),
+            "band_high_hz" => "1000".clone_into(&mut self.band_high_hz),
+            "envelope_hz" => "6".clone_into(&mut self.envelope_hz),
+            "order" => "4".clone_into(&mut self.order),
+            _ => return false,
+        }
+        true
     }
 }
 
@@ -253,6 +338,13 @@ pub(super) struct Forms {
     pub(super) preview: Option<PreviewedEmg>,
     /// The preview of the joint angles in the form.
     pub(super) joint_angle_preview: Option<RecordingPreview>,
+}
+
+impl Forms {
+    /// The attributes of a refused field of this form. Two forms can have fields of the same name.
+    pub(super) fn invalid(&self, form: &str, refused: &RefusedFields, field: &str) -> &'static str {
+        if self.open == form { refused.invalid(field) } else { "" }
+    }
 }
 
 /// A preview of an EMG recording, as the page shows it.

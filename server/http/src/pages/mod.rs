@@ -19,6 +19,7 @@ mod help;
 mod home;
 mod jobs;
 mod joint_peaks;
+mod lab_plan;
 mod lab_session_state;
 mod lab_sessions;
 mod lab_tablet;
@@ -97,7 +98,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{code}", get(rate::pair).post(rate::answer))
         .route("/rate/pair/{code}/retract", post(rate::retract))
-        .route("/studies/{id}/lab", get(lab_sessions::list).post(lab_sessions::plan))
+        .route("/studies/{id}/lab", get(lab_plan::list).post(lab_plan::plan))
         .route("/lab-sessions/{id}", get(lab_sessions::get))
         .route("/lab-sessions/{id}/close", post(lab_sessions::close))
         .route("/lab-sessions/{id}/unblind", post(lab_sessions::unblind))

@@ -8,14 +8,14 @@ use crate::extractors::{Form, FormFields, Params};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::muscle::{MuscleField, MuscleOverride, MuscleParameters};
 use gaitwright_service::access::{Read, RequiredRight, Run};
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::subject;
 use gaitwright_store::subjects::{self, Subject};
 use gaitwright_store::{SubjectId, commit};
@@ -41,7 +41,7 @@ struct MusclesPage {
     scaled_to_body: bool,
     may_run: bool,
     saved: bool,
-    refused: Option<FieldError>,
+    refused: RefusedFields,
 }
 
 struct MuscleRow {
@@ -57,7 +57,6 @@ struct ParameterCell {
     entry: String,
     /// The value of an empty field; `None` if the muscle does not span that joint.
     otherwise: Option<String>,
-    refused: bool,
 }
 
 /// Shows the values in force, or the entries of a refused form.
@@ -65,9 +64,9 @@ fn shown(
     subject: Subject,
     muscles: &MuscleParameters,
     may_run: bool,
-    refusal: Option<(&FormFields, FieldError)>,
+    refusal: Option<(&FormFields, RefusedFields)>,
 ) -> MusclesPage {
-    let (fields, refused) = refusal.map_or((None, None), |(fields, refused)| (Some(fields), Some(refused)));
+    let (fields, refused) = refusal.map(|(fields, refused)| (Some(fields), refused)).unwrap_or_default();
     let scaled_to_body = fields.map_or(muscles.scaled_to_body, |fields| fields.contains_key("scaled_to_body"));
     let unchanged = MuscleParameters { scaled_to_body, ..MuscleParameters::default() };
     let body = subject.body();
@@ -78,25 +77,42 @@ fn shown(
             let field = format!("{kind}_{}", column.name);
             let kept = given.as_ref().and_then(column.given).map(|value| value.to_string());
             ParameterCell {
-                label: format!("{name}: {}", column.meaning),
+                label: label(name, column),
                 entry: fields.map_or(kept, |fields| fields.get(&field).cloned()).unwrap_or_default(),
                 otherwise: otherwise.as_ref().and_then(column.value).map(format::number),
-                refused: refused.as_ref().is_some_and(|refused| is_of(&refused.field, &field)),
                 field,
             }
         };
         MuscleRow { name, cells: MuscleOverride::FIELDS.iter().map(cell).collect() }
     };
     let rows: Vec<MuscleRow> = KINDS.iter().map(row).collect();
-    let cell = rows.iter().flat_map(|row| &row.cells).find(|cell| cell.refused);
-    let message = refused.as_ref().zip(cell).map(|(refused, cell)| form_errors::of_field(&cell.label, refused));
-    let refused = refused.map(|refused| FieldError { message: message.unwrap_or(refused.message), ..refused });
     MusclesPage { subject, columns: MuscleOverride::FIELDS, rows, scaled_to_body, may_run, saved: false, refused }
 }
 
-/// `muscles.sol.max_force_n` is the field `sol_max_force_n`.
-fn is_of(refused: &str, field: &str) -> bool {
-    refused.trim_start_matches("muscles.").replacen('.', "_", 1) == field
+fn label(muscle: &str, column: &MuscleField) -> String {
+    format!("{muscle}: {}", column.meaning)
+}
+
+/// The form as typed.
+#[derive(Debug, Clone)]
+struct TypedMuscles(FormFields);
+
+impl TypedForm for TypedMuscles {
+    fn labels(&self) -> Vec<(String, String)> {
+        let of_muscle = |&(kind, name): &(&str, &str)| {
+            MuscleOverride::FIELDS.map(|column| (format!("{kind}_{}", column.name), label(name, &column)))
+        };
+        KINDS.iter().flat_map(of_muscle).collect()
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        self.0.remove(field).is_some()
+    }
+
+    /// `muscles.sol.max_force_n` is the field `sol_max_force_n`.
+    fn field_of(&self, refused: &str) -> String {
+        refused.trim_start_matches("muscles.").replacen('.', "_", 1)
+    }
 }
 
 /// `GET /subjects/{id}/muscles`.
@@ -123,22 +139,22 @@ pub(super) async fn post(
     let mut writer = app.write().await?;
     let subject = subjects::get(&mut writer, id).await?;
     let before = subjects::muscles(&mut writer, id).await?;
-    let set = match read(&fields) {
-        Ok(muscles) => subject::set_muscles(&mut writer, &authorized.caller.actor, id, &muscles).await,
-        Err(error) => Err(error),
-    };
-    match set {
-        Ok(()) => {
-            commit(writer).await?;
-            Ok(Redirect::to(&confirmed(&format!("/subjects/{id}/muscles"))).into_response())
-        }
-        Err(Error::Invalid(refused)) => {
-            let status = Problem::from(&Error::Invalid(refused.clone())).status();
-            let form = page(&shown(subject, &before, true, Some((&fields, *refused))))?;
-            Ok((status, form).into_response())
-        }
-        Err(other) => Err(other.into()),
+    let mut check = FormCheck::new(&TypedMuscles(fields));
+    let typed = check.form().0.clone();
+    let muscles = check.read(|TypedMuscles(fields)| {
+        let muscles = read(fields)?;
+        muscles.validate()?;
+        Ok(muscles)
+    })?;
+    let refused = check.into_refused();
+    if let Some(muscles) = muscles.filter(|_| refused.is_empty()) {
+        subject::set_muscles(&mut writer, &authorized.caller.actor, id, &muscles).await?;
+        commit(writer).await?;
+        return Ok(Redirect::to(&confirmed(&format!("/subjects/{id}/muscles"))).into_response());
     }
+    drop(writer);
+    let status = refused.status();
+    Ok((status, page(&shown(subject, &before, true, Some((&typed, refused))))?).into_response())
 }
 
 /// The entries as a document, without empty fields.

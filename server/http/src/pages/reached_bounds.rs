@@ -28,13 +28,14 @@ pub(super) fn of(
 ) -> Result<Vec<BoundUse>, Error> {
     let extremes = gait.map(extremes).transpose()?.unwrap_or_default();
     let values = action.to_array();
+    let limits = gait.map(|gait| gait.settings.limits.clone()).unwrap_or_default();
     let with_use = |(place, bound): (usize, Bound)| {
         let value = values[place];
         let interval = unchanged.iter().find(|interval| interval.bound == bound.name);
         BoundUse {
             unchanged_for: interval.map(|interval| in_words(interval, value)),
             reached: extremes[place].map(|reached| format::number(bound_units::shown(bound.name, reached))),
-            active: interval.is_some_and(|interval| interval.is_active(value)),
+            active: interval.is_some_and(|interval| interval.is_active(value, &limits)),
             bound: Bound { value: with_tolerance(&bound, value, gait), ..bound },
         }
     };

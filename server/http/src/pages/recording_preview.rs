@@ -12,8 +12,8 @@ use gaitwright_service::studies::reference_preview::ReferencePreview;
 /// A preview as the page shows it.
 #[derive(Debug)]
 pub(super) struct RecordingPreview {
-    /// Why the recording would be refused.
-    pub(super) refused: Option<String>,
+    /// Why the recording would be refused; empty if it would be accepted.
+    pub(super) refused: Vec<String>,
     /// A doubt about a recording that would be accepted.
     pub(super) warning: Option<String>,
     /// The legend of the charts, if they share it.
@@ -45,7 +45,7 @@ impl RecordingPreview {
             usage: usage(place),
         };
         Self {
-            refused: None,
+            refused: Vec::new(),
             warning: None,
             legend: shared_legend(&mut charts),
             charts,
@@ -79,7 +79,7 @@ impl RecordingPreview {
             Stride { is_plausible: false, .. } => "left out: too short or too long",
             Stride { .. } => "used",
         };
-        let refused = preview.refused.as_ref().map(form_errors::in_words);
+        let refused = preview.refused.iter().map(form_errors::in_words).collect();
         Self { refused, can_reject: true, ..Self::new(&charts, &strides, usage) }
     }
 
@@ -93,7 +93,7 @@ impl RecordingPreview {
         let usage = |place: usize| {
             if preview.strides[place].is_used { "a stride" } else { "too short, too long, or with a gap" }
         };
-        let refused = preview.refused.as_ref().map(form_errors::in_words);
+        let refused = preview.refused.iter().map(form_errors::in_words).collect();
         Self { refused, ..Self::new(&charts, &strides, usage) }
     }
 
@@ -110,9 +110,9 @@ impl RecordingPreview {
         let (mean, refused, warning) = match &preview.reference {
             Ok(found) => {
                 let charts = gait_charts::of_reference(found).iter().map(PageChart::new).collect();
-                (charts, None, found.warning().ok().flatten())
+                (charts, Vec::new(), found.warning().ok().flatten())
             }
-            Err(error) => (Vec::new(), Some(form_errors::in_words(error)), None),
+            Err(error) => (Vec::new(), vec![form_errors::in_words(error)], None),
         };
         Self { refused, warning, mean, ..Self::new(&charts, &strides, usage) }
     }

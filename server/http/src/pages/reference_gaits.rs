@@ -7,17 +7,16 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form as Submitted, Params};
 use crate::figures::reference_figures;
-use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Read, RequiredRight, Run};
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use gaitwright_store::reference_gaits::{self, ReferenceGait};
@@ -74,6 +73,42 @@ impl ReferenceGaitFields {
     }
 }
 
+impl ReferenceGaitFields {
+    /// The recording, with everything checked that needs no look into it.
+    fn read_and_check(&self) -> Result<NewReferenceGait, Error> {
+        let new = self.read()?;
+        new.check_person(self.button == "preview")?;
+        Ok(new)
+    }
+}
+
+impl TypedForm for ReferenceGaitFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[
+            ("name", "Name"),
+            ("height_m", "Height of the measured person, m"),
+            ("body_mass_kg", "Body mass, kg"),
+            ("recording", "File contents"),
+            ("heel_strikes_s", "Times of right heel strikes, s"),
+            ("unit", "Angle unit of an OpenSim file"),
+            ("force_column", "Column of the vertical force under the right foot"),
+            ("forces", "Contents of the force file"),
+        ])
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "name" => "a name".clone_into(&mut self.name),
+            "height_m" => self.height_m.clear(),
+            "body_mass_kg" => self.body_mass_kg.clear(),
+            "heel_strikes_s" => self.heel_strikes_s.clear(),
+            "unit" => self.unit.clear(),
+            _ => return false,
+        }
+        true
+    }
+}
+
 fn number(field: &str, text: &str) -> Result<f64, Error> {
     f64::from_str(text.trim()).map_err(|_| Error::invalid(field, text, "a number"))
 }
@@ -88,7 +123,7 @@ struct ReferenceGaitsPage {
     nearest_to: Option<Subject>,
     may_run: bool,
     fields: ReferenceGaitFields,
-    refused: Option<FieldError>,
+    refused: RefusedFields,
     /// The preview of the recording in the form.
     preview: Option<RecordingPreview>,
 }
@@ -113,13 +148,9 @@ impl ReferenceGaitsPage {
             nearest_to,
             may_run,
             fields: ReferenceGaitFields::default(),
-            refused: None,
+            refused: RefusedFields::default(),
             preview: None,
         })
-    }
-
-    fn refuses(&self, field: &str) -> bool {
-        self.refused.as_ref().is_some_and(|refused| refused.field == field)
     }
 
     fn is_nearest_to(&self, subject: &Subject) -> bool {
@@ -152,42 +183,33 @@ pub(super) async fn import(
     units: Units,
     Submitted(fields): Submitted<ReferenceGaitFields>,
 ) -> Result<Response, PageError> {
-    if fields.button == "preview" {
-        let preview = match fields.read() {
-            Ok(new) => {
-                let of = move |_: &OnPool| Ok(RecordingPreview::of_reference(&new.preview()?));
-                app.compute(of).await.map_err(Error::from)?
+    let mut check = FormCheck::new(&fields);
+    let new = check.read(ReferenceGaitFields::read_and_check)?;
+    let mut preview = None;
+    match new {
+        Some(new) if fields.button == "preview" => {
+            let of = move |_: &OnPool| Ok(RecordingPreview::of_reference(&new.preview()?));
+            match app.compute(of).await.map_err(Error::from)? {
+                Ok(found) => preview = Some(found),
+                Err(error) => check.refuse(error).map(drop)?,
             }
-            Err(error) => Err(error),
-        };
-        let (status, preview, refused) = match preview {
-            Ok(preview) => (StatusCode::OK, Some(preview), None),
-            Err(Error::Invalid(refused)) => {
-                (StatusCode::UNPROCESSABLE_ENTITY, None, Some(form_errors::with_label(*refused)))
-            }
-            Err(other) => return Err(other.into()),
-        };
-        let empty = ReferenceGaitsPage::read(&mut *app.read().await?, units, None, true).await?;
-        let form = page(&ReferenceGaitsPage { fields, refused, preview, ..empty })?;
-        return Ok((status, form).into_response());
-    }
-    let definition = match fields.read() {
-        Ok(new) => new.definition_on_pool(app.store_mut()).await,
-        Err(error) => Err(error),
-    };
-    let definition = match definition {
-        Ok(definition) => definition,
-        Err(Error::Invalid(refused)) => {
-            let empty = ReferenceGaitsPage::read(&mut *app.read().await?, units, None, true).await?;
-            let form = page(&ReferenceGaitsPage { fields, refused: Some(form_errors::with_label(*refused)), ..empty })?;
-            return Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response());
         }
-        Err(other) => return Err(other.into()),
-    };
-    let mut writer = app.write().await?;
-    let (added, _) = reference_import::add(&mut writer, &authorized.caller.actor, &definition).await?;
-    commit(writer).await?;
-    Ok(Redirect::to(&format!("/reference-gaits/{}", added.id)).into_response())
+        Some(new) => match new.definition_on_pool(app.store_mut()).await {
+            Ok(definition) if check.is_clean() => {
+                let mut writer = app.write().await?;
+                let (added, _) = reference_import::add(&mut writer, &authorized.caller.actor, &definition).await?;
+                commit(writer).await?;
+                return Ok(Redirect::to(&format!("/reference-gaits/{}", added.id)).into_response());
+            }
+            Ok(_) => {}
+            Err(error) => check.refuse(error).map(drop)?,
+        },
+        None => {}
+    }
+    let refused = check.into_refused();
+    let status = refused.status();
+    let empty = ReferenceGaitsPage::read(&mut *app.read().await?, units, None, true).await?;
+    Ok((status, page(&ReferenceGaitsPage { fields, refused, preview, ..empty })?).into_response())
 }
 
 #[derive(Template)]

@@ -10,14 +10,16 @@ use crate::bound_units;
 use crate::extractors::Params;
 use crate::figures::{COURSE, StudyOutcome, StudyResults, course, have_one_reference_gait};
 use crate::format;
-use crate::page_error::{PageResult, page};
+use crate::page_error::{PageError, page};
+use crate::refused_fields::RefusedFields;
 use askama::Template;
 use axum::extract::State;
+use axum::response::{IntoResponse, Response};
 use gait_optimizer::TunedBounds;
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
-use gaitwright_service::error::Error;
+use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -44,8 +46,7 @@ struct SideBySide {
     a: Option<StudyId>,
     b: Option<StudyId>,
     compared: Option<Compared>,
-    /// Whether the same study was chosen twice.
-    is_same: bool,
+    refused: RefusedFields,
 }
 
 impl SideBySide {
@@ -79,7 +80,7 @@ pub(super) async fn get(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
     Params(choice): Params<StudiesQuery>,
-) -> PageResult {
+) -> Result<Response, PageError> {
     let reach = authorized.caller.reach();
     let mut reader = app.read().await?;
     let shown: BTreeSet<SubjectId> =
@@ -87,8 +88,14 @@ pub(super) async fn get(
     let mut offered = studies::page(&mut reader, reach, &StudyFilter::newest(OFFERED)).await?;
     offered.retain(|study| shown.contains(&study.plan.subject_id));
     let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
+    let mut refused = RefusedFields::default();
     let compared = match (a, b) {
-        (Some(a), Some(b)) if a != b => {
+        (Some(a), Some(b)) if a == b => {
+            let message = "\u{201c}Study B\u{201d} is the same study as study A. Choose another one.";
+            refused = RefusedFields::of(FieldError::in_words("b", message).into())?;
+            None
+        }
+        (Some(a), Some(b)) => {
             let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
             drop(reader);
             let analyses = Arc::clone(&app.analyses);
@@ -100,12 +107,11 @@ pub(super) async fn get(
             None
         }
     };
-    let is_same = a.is_some() && a == b;
     // The form proposes two different studies: the newest ones besides the chosen one.
     let other_than = |taken: Option<StudyId>| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
     let a = a.or_else(|| other_than(b));
-    let b = b.filter(|_| !is_same).or_else(|| other_than(a));
-    page(&SideBySide { offered, a, b, compared, is_same })
+    let b = b.or_else(|| other_than(a));
+    Ok((refused.status(), page(&SideBySide { offered, a, b, compared, refused })?).into_response())
 }
 
 /// Adds the best gaits.

@@ -5,9 +5,8 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
-use crate::form_errors;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -15,13 +14,10 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_change::{self, StudyChange};
-use gaitwright_service::studies::study_plan;
 use gaitwright_store::studies::{Study, StudyState};
-use gaitwright_store::{StudyId, Writer, commit, studies};
+use gaitwright_store::{StudyId, commit, studies};
 use serde::Deserialize;
-
-/// Labels of the fields.
-const LABELS: &[(&str, &str)] = &[("name", "Name"), ("tags", "Tags"), ("notes", "Notes")];
+use std::ops::ControlFlow;
 
 #[derive(Template)]
 #[template(path = "study_details.html")]
@@ -30,7 +26,7 @@ struct DetailsPage {
     fields: StudyDetailsFields,
     may_run: bool,
     saved: bool,
-    refused: Option<String>,
+    refused: RefusedFields,
 }
 
 impl DetailsPage {
@@ -81,6 +77,23 @@ impl StudyDetailsFields {
     }
 }
 
+impl TypedForm for StudyDetailsFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[("name", "Name"), ("tags", "Tags"), ("notes", "Notes")])
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            // A name that no study has.
+            "name" => self.name = StudyId::fresh().to_string(),
+            "tags" => self.tags.clear(),
+            "notes" => self.notes.clear(),
+            _ => return false,
+        }
+        true
+    }
+}
+
 /// `GET /studies/{id}/details`.
 pub(super) async fn get(
     authorized: Authorized<Read>,
@@ -96,9 +109,9 @@ async fn show(
     caller: &Caller,
     id: StudyId,
     saved: bool,
-    refusal: Option<(Option<StudyDetailsFields>, String)>,
+    refusal: Option<(Option<StudyDetailsFields>, RefusedFields)>,
 ) -> PageResult {
-    let (typed, refused) = refusal.map_or((None, None), |(typed, refused)| (typed, Some(refused)));
+    let (typed, refused) = refusal.unwrap_or_default();
     let study = studies::get(&mut *app.read().await?, id).await?;
     let fields = typed.unwrap_or_else(|| StudyDetailsFields::of(&study));
     page(&DetailsPage { study, fields, may_run: caller.may(Run::NEEDED), saved, refused })
@@ -111,34 +124,28 @@ pub(super) async fn post(
     Id(id, _): Id<StudyId, Run>,
     Form(fields): Form<StudyDetailsFields>,
 ) -> Result<Response, PageError> {
+    let (caller, mut check) = (&authorized.caller, FormCheck::new(&fields));
     let mut writer = app.write().await?;
-    match change(&mut writer, &authorized.caller, id, &fields).await {
-        Ok(()) => {
-            commit(writer).await?;
-            app.scheduler.changed();
-            let to =
-                if fields.button == "archive" { "/".to_owned() } else { confirmed(&format!("/studies/{id}/details")) };
-            Ok(Redirect::to(&to).into_response())
+    let change = loop {
+        let read = async {
+            let change = check.form().change()?;
+            study_change::check(&mut writer, caller.reach(), id, &change).await?;
+            Ok(change)
         }
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            drop(writer);
-            let status = Problem::from(&error).status();
-            let refused = form_errors::of_form(&error, LABELS);
-            let typed = Some(fields).filter(|fields| fields.button == "save");
-            Ok((status, show(&app, &authorized.caller, id, false, Some((typed, refused))).await?).into_response())
+        .await;
+        if let ControlFlow::Break(change) = check.step(read)? {
+            break change;
         }
-        Err(error) => Err(error.into()),
+    };
+    let refused = check.into_refused();
+    if let Some(change) = change.filter(|_| refused.is_empty()) {
+        study_change::change(&mut writer, &caller.actor, caller.reach(), id, &change).await?;
+        commit(writer).await?;
+        app.scheduler.changed();
+        return Ok(Redirect::to(&confirmed(&format!("/studies/{id}/details"))).into_response());
     }
-}
-
-async fn change(writer: &mut Writer, caller: &Caller, id: StudyId, fields: &StudyDetailsFields) -> Result<(), Error> {
-    let change = fields.change()?;
-    if let Some(name) = change.name.as_deref().map(str::trim)
-        && studies::is_named(writer, caller.reach(), name, Some(id)).await?
-    {
-        let free = study_plan::free_name(writer, caller.reach(), name).await?;
-        return Err(study_plan::name_is_taken(name, &free));
-    }
-    study_change::change(writer, &caller.actor, id, &change).await?;
-    Ok(())
+    drop(writer);
+    let status = refused.status();
+    let typed = Some(fields).filter(|fields| fields.button == "save");
+    Ok((status, show(&app, caller, id, false, Some((typed, refused))).await?).into_response())
 }

@@ -5,10 +5,9 @@ use crate::AppState;
 use crate::accessible::{DespiteWithdrawal, Id};
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
-use crate::form_errors;
 use crate::format::{variant, words};
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
@@ -48,9 +47,11 @@ struct SubjectPage {
     corrected: i64,
     may_administer: bool,
     saved: bool,
-    refused: Option<String>,
+    refused: RefusedFields,
     /// The correction as typed, or the present values.
     correction: Correcting,
+    /// The form in a refused consent.
+    consent_form: String,
     /// The reason in a refused withdrawal.
     withdrawal_reason: String,
 }
@@ -91,6 +92,7 @@ enum SentForm {
     /// The form was saved.
     Saved,
     Correction(Correcting),
+    Consent(String),
     Withdrawal(String),
 }
 
@@ -118,7 +120,7 @@ pub(super) async fn get(
     Params(Saved { saved }): Params<Saved>,
 ) -> PageResult {
     let form = if saved { SentForm::Saved } else { SentForm::Nothing };
-    show(&app, units, id, &authorized.caller, None, form).await
+    show(&app, units, id, &authorized.caller, RefusedFields::default(), form).await
 }
 
 async fn show(
@@ -126,7 +128,7 @@ async fn show(
     units: Units,
     id: SubjectId,
     caller: &Caller,
-    refused: Option<String>,
+    refused: RefusedFields,
     typed: SentForm,
 ) -> PageResult {
     let (may_run, may_administer) = (caller.may(Run::NEEDED), caller.may(Administer::NEEDED));
@@ -144,11 +146,13 @@ async fn show(
     drop(reader);
     let after = last.map_or(0, |last| last.seq);
     let corrected = corrections.last().map_or(0, |last| last.seq);
-    let (mut correction, mut withdrawal_reason) = (Correcting::of(&subject, units), String::new());
+    let mut correction = Correcting::of(&subject, units);
+    let (mut consent_form, mut withdrawal_reason) = (String::new(), String::new());
     let saved = matches!(typed, SentForm::Saved);
     match typed {
         SentForm::Nothing | SentForm::Saved => {}
         SentForm::Correction(typed) => correction = typed,
+        SentForm::Consent(form) => consent_form = form,
         SentForm::Withdrawal(reason) => withdrawal_reason = reason,
     }
     page(&SubjectPage {
@@ -166,6 +170,7 @@ async fn show(
         saved,
         refused,
         correction,
+        consent_form,
         withdrawal_reason,
     })
 }
@@ -210,8 +215,9 @@ pub(super) async fn consent(
     DespiteWithdrawal(id, _): DespiteWithdrawal<SubjectId, Run>,
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
-    let done = give(&app, &authorized, id, form).await;
-    answer(&app, units, id, &authorized.caller, done, SentForm::Nothing).await
+    let typed = SentForm::Consent(form.form.clone());
+    let refused = refused_once(give(&app, &authorized, id, form).await)?;
+    answer(&app, units, id, &authorized.caller, refused, typed).await
 }
 
 async fn give(app: &AppState, authorized: &Authorized<Run>, id: SubjectId, form: Signed) -> Result<(), Error> {
@@ -243,7 +249,7 @@ pub(super) async fn withdraw(
             "Nothing was changed. First tick the box to confirm that all studies of this subject will be stopped.",
         ))
     };
-    answer(&app, units, id, &authorized.caller, done, SentForm::Withdrawal(why.reason)).await
+    answer(&app, units, id, &authorized.caller, refused_once(done)?, SentForm::Withdrawal(why.reason)).await
 }
 
 /// The form of a withdrawal.
@@ -272,7 +278,7 @@ async fn end(
 }
 
 /// Corrected height and mass, as typed.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Deserialize)]
 pub(super) struct CorrectionForm {
     height_m: String,
     body_mass_kg: String,
@@ -281,6 +287,31 @@ pub(super) struct CorrectionForm {
     units: Units,
     reason: String,
     before: i64,
+}
+
+impl CorrectionForm {
+    fn read(&self) -> Result<NewCorrection, Error> {
+        let (height_m, body_mass_kg) = self.units.read_height_and_mass(&self.height_m, &self.body_mass_kg)?;
+        let new = NewCorrection { height_m, body_mass_kg, reason: self.reason.clone() };
+        subject::check_correction(&new)?;
+        Ok(new)
+    }
+}
+
+impl TypedForm for CorrectionForm {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[("height_m", "Height, m"), ("body_mass_kg", "Body mass, kg"), ("reason", "Reason")])
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "height_m" => "1.75 m".clone_into(&mut self.height_m),
+            "body_mass_kg" => "70 kg".clone_into(&mut self.body_mass_kg),
+            "reason" => "a reason".clone_into(&mut self.reason),
+            _ => return false,
+        }
+        true
+    }
 }
 
 /// `POST /subjects/{id}/correct`.
@@ -297,45 +328,51 @@ pub(super) async fn correct(
         reason: form.reason.clone(),
         refused: true,
     };
-    let done = set_right(&app, &authorized, id, form).await;
-    answer(&app, units, id, &authorized.caller, done, SentForm::Correction(typed)).await
+    let mut check = FormCheck::new(&form);
+    let new = check.read(CorrectionForm::read)?;
+    if let Some(new) = new.filter(|_| check.is_clean())
+        && let Err(error) = set_right(&app, &authorized, id, form.before, &new).await
+    {
+        check.refuse(error)?;
+    }
+    answer(&app, units, id, &authorized.caller, check.into_refused(), SentForm::Correction(typed)).await
 }
 
 async fn set_right(
     app: &AppState,
     authorized: &Authorized<Run>,
     id: SubjectId,
-    form: CorrectionForm,
+    before: i64,
+    new: &NewCorrection,
 ) -> Result<(), Error> {
-    let (height_m, body_mass_kg) = form.units.read_height_and_mass(&form.height_m, &form.body_mass_kg)?;
-    let new = NewCorrection { height_m, body_mass_kg, reason: form.reason };
     let mut writer = app.write().await?;
     let newest = subjects::corrections(&mut writer, id).await?.last().map_or(0, |last| last.seq);
-    if newest != form.before {
+    if newest != before {
         return Err(Error::conflict(
             "Nothing was changed, because height and mass were corrected after this form was loaded. Check the values on this \
              page, then send the form again.",
         ));
     }
-    subject::correct(&mut writer, &authorized.caller.actor, id, &new).await?;
+    subject::correct(&mut writer, &authorized.caller.actor, id, new).await?;
     Ok(commit(writer).await?)
 }
 
-/// Shows the subject again after a change, with the reason if it was refused.
+/// The refusal of a form whose fields are checked once.
+fn refused_once(done: Result<(), Error>) -> Result<RefusedFields, Error> {
+    done.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))
+}
+
+/// Shows the subject again after a change, with the reasons if it was refused.
 async fn answer(
     app: &AppState,
     units: Units,
     id: SubjectId,
     caller: &Caller,
-    done: Result<(), Error>,
+    refused: RefusedFields,
     typed: SentForm,
 ) -> Result<Response, PageError> {
-    match done {
-        Ok(()) => Ok(Redirect::to(&confirmed(&format!("/subjects/{id}"))).into_response()),
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, units, id, caller, Some(form_errors::in_words(&error)), typed).await?;
-            Ok((Problem::from(&error).status(), shown).into_response())
-        }
-        Err(other) => Err(other.into()),
+    if refused.is_empty() {
+        return Ok(Redirect::to(&confirmed(&format!("/subjects/{id}"))).into_response());
     }
+    Ok((refused.status(), show(app, units, id, caller, refused, typed).await?).into_response())
 }

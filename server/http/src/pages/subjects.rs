@@ -3,20 +3,20 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
-use crate::form_errors;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_service::access::{Read, RequiredRight, Run};
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::subject::{self, NewSubject};
 use gaitwright_store::consents::{self, ConsentKind};
 use gaitwright_store::subjects::{self, Subject};
-use gaitwright_store::{SubjectId, commit};
+use gaitwright_store::{StudyId, SubjectId, commit};
 use serde::Deserialize;
+use std::ops::ControlFlow;
 
 /// How many subjects the list shows.
 const PAGE: u32 = 100;
@@ -30,19 +30,7 @@ struct SubjectsPage {
     next: Option<SubjectId>,
     may_run: bool,
     fields: SubjectFields,
-    /// Every refused field.
-    refused: Vec<FieldError>,
-}
-
-impl SubjectsPage {
-    /// The attributes that mark a refused field and point to the reason. The first one gets the focus.
-    fn invalid(&self, field: &str) -> &'static str {
-        match self.refused.iter().position(|refused| refused.field == field) {
-            Some(0) => " aria-invalid=\"true\" aria-describedby=\"refused\" autofocus",
-            Some(_) => " aria-invalid=\"true\" aria-describedby=\"refused\"",
-            None => "",
-        }
-    }
+    refused: RefusedFields,
 }
 
 /// The fields as typed, to show a refused form again.
@@ -64,26 +52,38 @@ impl SubjectFields {
     }
 }
 
-/// Every field of a new subject that would be refused, in the order of the form.
-fn faults(fields: &SubjectFields) -> Vec<FieldError> {
-    let mut repaired = fields.clone();
-    let mut found: Vec<FieldError> = Vec::new();
-    // Each field is refused once, and an acceptable value takes its place.
-    while let Err(Error::Invalid(fault)) = repaired.read().and_then(|new| subject::check_new(&new)) {
-        if found.iter().any(|known| known.field == fault.field) {
-            break;
-        }
-        match fault.field.as_str() {
-            "pseudonym" => "S01".clone_into(&mut repaired.pseudonym),
-            "height_m" => "1.75 m".clone_into(&mut repaired.height_m),
-            "body_mass_kg" => "70 kg".clone_into(&mut repaired.body_mass_kg),
-            _ => repaired.notes.clear(),
-        }
-        found.push(form_errors::with_label(*fault));
+impl TypedForm for SubjectFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[
+            ("pseudonym", "Pseudonym"),
+            ("height_m", "Height, m"),
+            ("body_mass_kg", "Body mass, kg"),
+            ("notes", "Notes"),
+        ])
     }
-    let place = |fault: &FieldError| ["pseudonym", "height_m", "body_mass_kg"].iter().position(|f| *f == fault.field);
-    found.sort_by_key(|fault| place(fault).unwrap_or(usize::MAX));
-    found
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "pseudonym" => self.pseudonym = unused_pseudonym(),
+            "height_m" => "1.75 m".clone_into(&mut self.height_m),
+            "body_mass_kg" => "70 kg".clone_into(&mut self.body_mass_kg),
+            "notes" => self.notes.clear(),
+            _ => return false,
+        }
+        true
+    }
+
+    /// The only possible conflict is a pseudonym that is taken.
+    fn field_in_conflict(&self) -> Option<&'static str> {
+        Some("pseudonym")
+    }
+}
+
+/// A pseudonym that nobody uses: the letters of a fresh identifier.
+pub(super) fn unused_pseudonym() -> String {
+    let hex = StudyId::fresh().to_string();
+    let letter = |c: char| char::from_digit(c.to_digit(16)? + 10, 36);
+    hex.chars().filter_map(letter).collect()
 }
 
 struct SubjectRow {
@@ -105,7 +105,15 @@ pub(super) async fn list(
     units: Units,
     Params(SubjectsBefore { before }): Params<SubjectsBefore>,
 ) -> PageResult {
-    show_list(&app, units, before, authorized.caller.may(Run::NEEDED), SubjectFields::default(), Vec::new()).await
+    show_list(
+        &app,
+        units,
+        before,
+        authorized.caller.may(Run::NEEDED),
+        SubjectFields::default(),
+        RefusedFields::default(),
+    )
+    .await
 }
 
 /// `POST /subjects`: adds one, before it has a study.
@@ -115,25 +123,27 @@ pub(super) async fn add(
     units: Units,
     Form(fields): Form<SubjectFields>,
 ) -> Result<Response, PageError> {
-    let added = async {
-        let new = fields.read()?;
-        let mut writer = app.write().await?;
+    let mut check = FormCheck::new(&fields);
+    let mut writer = app.write().await?;
+    let new = loop {
+        let read = async {
+            let new = check.form().read()?;
+            subject::checked(&mut writer, &new).await?;
+            Ok(new)
+        }
+        .await;
+        if let ControlFlow::Break(new) = check.step(read)? {
+            break new;
+        }
+    };
+    let refused = check.into_refused();
+    if let Some(new) = new.filter(|_| refused.is_empty()) {
         let subject = subject::add(&mut writer, &authorized.caller.actor, &new).await?;
         commit(writer).await?;
-        Ok(subject.id)
-    };
-    let error = match added.await {
-        Ok(id) => return Ok(Redirect::to(&format!("/subjects/{id}")).into_response()),
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => error,
-        Err(other) => return Err(other.into()),
-    };
-    let status = Problem::from(&error).status();
-    let refused = match error {
-        Error::Invalid(_) => faults(&fields),
-        // The only possible conflict is a pseudonym that is taken.
-        other => vec![FieldError::in_words("pseudonym", &other.to_string())],
-    };
-    Ok((status, show_list(&app, units, None, true, fields, refused).await?).into_response())
+        return Ok(Redirect::to(&format!("/subjects/{}", subject.id)).into_response());
+    }
+    drop(writer);
+    Ok((refused.status(), show_list(&app, units, None, true, fields, refused).await?).into_response())
 }
 
 async fn show_list(
@@ -142,7 +152,7 @@ async fn show_list(
     before: Option<SubjectId>,
     may_run: bool,
     fields: SubjectFields,
-    refused: Vec<FieldError>,
+    refused: RefusedFields,
 ) -> PageResult {
     let mut reader = app.read().await?;
     let mut found = subjects::page(&mut reader, before, PAGE + 1).await?;

@@ -37,10 +37,11 @@ pub(super) fn levels_with_gait(
 /// The tuned bounds that were active in no gait of the study. Empty if there are fewer than two gaits, or if one does not say.
 pub fn never_active(snapshot: &StudySnapshot) -> Vec<String> {
     let gaits: Vec<&Trial> = with_gait(snapshot).collect();
+    let limits = &snapshot.study.plan.gait_settings.limits;
     let is_inactive = |trial: &Trial, name: &str| {
         let mut bounds = trial.report.iter().flat_map(|report| &report.unchanged_bounds);
         let value = TunedBounds::place_of(name).map(|place| trial.action.to_array()[place]);
-        bounds.any(|bound| bound.bound == name && value.is_some_and(|value| !bound.is_active(value)))
+        bounds.any(|bound| bound.bound == name && value.is_some_and(|value| !bound.is_active(value, limits)))
     };
     let tuned = snapshot.study.plan.search_space.dimensions().iter().filter(|dimension| dimension.values.len() > 1);
     tuned

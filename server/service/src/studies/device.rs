@@ -3,9 +3,9 @@
 use crate::error::Error;
 use crate::printable;
 use gait_optimizer::Device as Definition;
-use gaitwright_store::Writer;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::devices::{self, Device};
+use gaitwright_store::{Connection, Writer};
 use serde_json::json;
 
 /// Checks the name and the numbers of a device.
@@ -17,17 +17,25 @@ pub fn check(definition: &Definition) -> Result<(), Error> {
     Ok(definition.validate()?)
 }
 
-/// Adds a device, or returns the identical one that is already on record. Names are unique, so that people can choose
-/// one from a list.
+/// Checks a device as [`add`] does, without adding it. Names are unique, so that people can choose one from a list.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub async fn check_new(db: &mut Connection, definition: &Definition) -> Result<(), Error> {
+    check(definition)?;
+    let name = definition.name.as_str();
+    if devices::find(db, definition).await?.is_none() && devices::has_name(db, name).await? {
+        return Err(Error::invalid("device.name", name, "a name that no other device has"));
+    }
+    Ok(())
+}
+
+/// Adds a device, or returns the identical one that is already on record.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(Device, bool), Error> {
-    check(definition)?;
-    let name = definition.name.as_str();
-    if devices::find(writer, definition).await?.is_none() && devices::has_name(writer, name).await? {
-        return Err(Error::invalid("device.name", name, "a name that no other device has"));
-    }
+    check_new(writer, definition).await?;
     let (device, added) = devices::ensure(writer, definition).await?;
     if added {
         let detail = json!({ "name": device.name });

@@ -73,6 +73,7 @@ mod stopping_rule;
 pub mod study_change;
 pub mod study_clone;
 pub mod study_extension;
+mod study_name;
 pub mod study_plan;
 pub mod study_plan_schemas;
 pub mod subject;

@@ -118,6 +118,22 @@ impl NewReferenceGait {
         self.definition_of(&self.motion(what, forces)?)
     }
 
+    /// Checks what needs no look into the recording: the measured person and, unless the recording is only previewed, the
+    /// name.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field.
+    pub fn check_person(&self, is_preview: bool) -> Result<(), Error> {
+        if !is_preview {
+            printable::name("name", &self.name, LONGEST_NAME)?;
+        }
+        Ok(self.walker().validate()?)
+    }
+
+    fn walker(&self) -> MeasuredPerson {
+        MeasuredPerson { height_m: self.height_m, body_mass_kg: self.body_mass_kg }
+    }
+
     /// Reads the recording, and its forces.
     ///
     /// # Errors
@@ -161,8 +177,7 @@ impl NewReferenceGait {
     /// Cuts a recording at heel strikes and averages the strides.
     pub(super) fn definition_of(&self, recording: &MotionRecording) -> Result<Definition, Error> {
         let name = printable::name("name", &self.name, LONGEST_NAME)?;
-        let walker = MeasuredPerson { height_m: self.height_m, body_mass_kg: self.body_mass_kg };
-        let definition = recording.reference(name, &self.heel_strikes(), walker)?;
+        let definition = recording.reference(name, &self.heel_strikes(), self.walker())?;
         if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
             let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");
             let given = format!("a file with {} bytes of comments", definition.provenance.len());

@@ -1,12 +1,13 @@
 //! Changes a study: its name, tags, notes and limits. For pages and REST.
 
-use super::study_plan;
 use super::tags::checked_tags;
+use super::{study_name, study_plan};
+use crate::access::Reach;
 use crate::error::Error;
 use crate::printable;
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::studies::{Study, StudyLimits, StudyState};
-use gaitwright_store::{StudyId, Writer, events, now, studies};
+use gaitwright_store::{Connection, Instant, StudyId, Writer, events, now, studies};
 use serde::Deserialize;
 use serde_json::json;
 use utoipa::ToSchema;
@@ -15,7 +16,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyChange {
-    /// Name shown to users.
+    /// Name shown to users, which no other study that you can see has.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 120)]
     pub name: Option<String>,
@@ -54,15 +55,28 @@ pub(super) fn check_filing(study: &Study) -> Result<(), Error> {
     Ok(())
 }
 
-/// Applies changes to a study.
+/// A study as it becomes by a change.
+struct ChangedStudy {
+    before: Study,
+    limits: StudyLimits,
+    tags: Vec<String>,
+    notes: String,
+    archived_at: Option<Instant>,
+}
+
+/// Checks changes to a study as [`change`] does, without writing.
 ///
 /// # Errors
-/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
-pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &StudyChange) -> Result<Study, Error> {
-    let study = studies::get(writer, id).await?;
+/// As [`change`].
+pub async fn check(db: &mut Connection, reach: Reach, id: StudyId, change: &StudyChange) -> Result<(), Error> {
+    checked(db, reach, id, change).await.map(drop)
+}
+
+async fn checked(db: &mut Connection, reach: Reach, id: StudyId, change: &StudyChange) -> Result<ChangedStudy, Error> {
+    let study = studies::get(db, id).await?;
     let name = match change.name.as_deref().map(str::trim) {
-        None => study.plan.name.clone(),
-        Some(name) => printable::name("name", name, study_plan::LONGEST_NAME)?.to_owned(),
+        Some(name) if name != study.plan.name => study_name::checked(db, reach, name, Some(id)).await?,
+        _ => study.plan.name.clone(),
     };
     let limits = StudyLimits {
         name,
@@ -77,10 +91,10 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &St
         Some(tags) => checked_tags(tags)?,
     };
     let notes = match change.notes.as_deref().map(str::trim) {
-        None => study.notes.as_str(),
+        None => study.notes.clone(),
         Some(notes) => {
             printable::note("notes", notes, LONGEST_NOTES)?;
-            notes
+            notes.to_owned()
         }
     };
     let archived_at = match change.archived {
@@ -93,8 +107,23 @@ pub async fn change(writer: &mut Writer, actor: &Actor, id: StudyId, change: &St
         Some(false) => None,
         _ => study.archived_at,
     };
+    Ok(ChangedStudy { before: study, limits, tags, notes, archived_at })
+}
+
+/// Applies changes to a study. `reach` has the studies whose names are taken.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::NotFound`].
+pub async fn change(
+    writer: &mut Writer,
+    actor: &Actor,
+    reach: Reach,
+    id: StudyId,
+    change: &StudyChange,
+) -> Result<Study, Error> {
+    let ChangedStudy { before: study, limits, tags, notes, archived_at } = checked(writer, reach, id, change).await?;
     studies::set_limits(writer, id, &limits).await?;
-    studies::set_filing(writer, id, &tags, notes, archived_at).await?;
+    studies::set_filing(writer, id, &tags, &notes, archived_at).await?;
     let detail = json!({
         "name": limits.name, "priority": limits.priority, "parallel_trials": limits.parallel_trials,
         "tags": tags, "notes": notes, "archived": archived_at.is_some(),

@@ -1,6 +1,7 @@
 //! Clones a study: a new one with the same set-up. For pages and REST.
 
-use super::study_plan;
+use super::{study_name, study_plan};
+use crate::access::Reach;
 use crate::error::Error;
 use gaitwright_store::audit::Actor;
 use gaitwright_store::studies::{AnswerSource, Study};
@@ -12,7 +13,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyClone {
-    /// Name shown to users.
+    /// Name shown to users, which no other study that you can see has. That of the parent and "(clone)" by default.
     #[serde(default)]
     pub name: Option<String>,
     /// Seed for all random draws except allocations.
@@ -36,24 +37,26 @@ pub struct StudyClone {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`].
-pub async fn clone_study(writer: &mut Writer, actor: &Actor, id: StudyId, clone: &StudyClone) -> Result<Study, Error> {
+pub async fn clone_study(
+    writer: &mut Writer,
+    actor: &Actor,
+    reach: Reach,
+    id: StudyId,
+    clone: &StudyClone,
+) -> Result<Study, Error> {
     let from = studies::get(writer, id).await?;
     let mut new = study_plan::NewStudy::like(&from.plan);
-    new.name = Some(clone.name.clone().unwrap_or_else(|| clone_name(&from.plan.name)));
+    new.name = Some(match &clone.name {
+        Some(name) => name.clone(),
+        None => study_name::free(writer, reach, &study_name::marked(&from.plan.name, " (clone)")).await?,
+    });
     new.seed = clone.seed.unwrap_or(new.seed);
     new.number_of_trials = clone.number_of_trials.unwrap_or(new.number_of_trials);
     new.muscles = clone.muscles.unwrap_or(new.muscles);
     new.answer_source = clone.answer_source.unwrap_or(new.answer_source);
     new.start = clone.start;
-    let made = study_plan::create_from(writer, actor, new, Some(id)).await?;
+    let made = study_plan::create_from(writer, actor, reach, new, Some(id)).await?;
     // The set-up of a restricted study stays visible to its members only.
     members::inherit(writer, id, made.id, actor.as_str()).await?;
     Ok(made)
-}
-
-/// The default name of a clone: that of the study, shortened if it would be too long.
-fn clone_name(name: &str) -> String {
-    const MARK: &str = " (clone)";
-    let kept: String = name.chars().take(study_plan::LONGEST_NAME - MARK.len()).collect();
-    format!("{}{MARK}", kept.trim_end())
 }

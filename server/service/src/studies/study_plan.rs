@@ -3,7 +3,7 @@
 use super::bound_grid::{self, RequestedSearchSpace};
 use super::seed::LARGEST_SEED;
 use super::subject::{self, NewSubject};
-use super::{built_in_entries, membership, simulated_walks, study_plan_schemas};
+use super::{built_in_entries, membership, simulated_walks, study_name, study_plan_schemas};
 use crate::access::{Caller, Reach};
 use crate::error::{Error, FieldError};
 use crate::printable;
@@ -27,7 +27,7 @@ use utoipa::ToSchema;
 pub struct NewStudy {
     /// Identifier of the subject.
     pub subject_id: SubjectId,
-    /// Name shown to users. Made from subject and variant by default.
+    /// Name shown to users, which no other study that you can see has. Made from subject and variant by default.
     #[serde(default)]
     pub name: Option<String>,
     /// Identifier of the device. The built-in one by default.
@@ -189,15 +189,12 @@ impl NewStudy {
     }
 }
 
-/// Maximum length of a name, characters.
-pub(super) const LONGEST_NAME: usize = 120;
-
-/// Creates a study.
+/// Creates a study. `reach` has the studies whose names are taken.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::NotFound`] for an unknown subject, device or reference gait.
-pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result<Study, Error> {
-    create_from(writer, actor, new, None).await
+pub async fn create(writer: &mut Writer, actor: &Actor, reach: Reach, new: NewStudy) -> Result<Study, Error> {
+    create_from(writer, actor, reach, new, None).await
 }
 
 /// [`create`], and makes the caller a member if the study is restricted.
@@ -205,39 +202,16 @@ pub async fn create(writer: &mut Writer, actor: &Actor, new: NewStudy) -> Result
 /// # Errors
 /// As [`create`].
 pub async fn create_by(writer: &mut Writer, caller: &Caller, new: NewStudy) -> Result<Study, Error> {
-    let study = create(writer, &caller.actor, new).await?;
+    let study = create(writer, &caller.actor, caller.reach(), new).await?;
     membership::ensure_caller_is_member(writer, caller, study.id).await?;
     Ok(study)
-}
-
-/// A name that no study in reach has: this one, or with a number after it.
-///
-/// # Errors
-/// Errors of the database.
-pub async fn free_name(db: &mut Connection, reach: Reach, name: &str) -> Result<String, Error> {
-    let mut free = name.to_owned();
-    let mut number = 2_u32;
-    while studies::is_named(db, reach, &free, None).await? {
-        let mark = format!(" ({number})");
-        let kept: String = name.chars().take(LONGEST_NAME - mark.len()).collect();
-        free = format!("{}{mark}", kept.trim_end());
-        number += 1;
-    }
-    Ok(free)
-}
-
-/// The refusal of a name that another study in reach has.
-pub fn name_is_taken(name: &str, free: &str) -> Error {
-    let message = format!(
-        "Another study is named \u{201c}{name}\u{201d}. Choose another name, for example \u{201c}{free}\u{201d}."
-    );
-    FieldError::in_words("name", &message).into()
 }
 
 /// The same, for a clone of a study.
 pub(super) async fn create_from(
     writer: &mut Writer,
     actor: &Actor,
+    reach: Reach,
     new: NewStudy,
     cloned_from: Option<StudyId>,
 ) -> Result<Study, Error> {
@@ -246,7 +220,7 @@ pub(super) async fn create_from(
     // A clone copies the set-up of its parent, muscle values included.
     let new = if cloned_from.is_some() { new } else { with_own_muscles(writer, new).await? };
     let restricted = new.restricted;
-    let mut plan = check(writer, new).await?;
+    let mut plan = check(writer, reach, new).await?;
     if let Some(parent) = cloned_from {
         // Both studies will be compared, so a correction of the subject since then does not apply.
         plan.body = studies::get(writer, parent).await?.plan.body;
@@ -269,18 +243,23 @@ pub(super) async fn create_from(
 ///
 /// # Errors
 /// As [`create`]; nothing is written.
-pub async fn checked(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+pub async fn checked(db: &mut Connection, reach: Reach, new: NewStudy) -> Result<StudyPlan, Error> {
     let new = with_own_muscles(db, new).await?;
-    check(db, new).await
+    check(db, reach, new).await
 }
 
 /// As [`checked`], for a subject who is not on record yet. Ignores [`NewStudy::subject_id`].
 ///
 /// # Errors
 /// As [`create`]; nothing is written.
-pub async fn checked_for_new(db: &mut Connection, subject: &NewSubject, new: NewStudy) -> Result<StudyPlan, Error> {
+pub async fn checked_for_new(
+    db: &mut Connection,
+    reach: Reach,
+    subject: &NewSubject,
+    new: NewStudy,
+) -> Result<StudyPlan, Error> {
     let body = subject::checked(db, subject).await?;
-    check_for(db, subject.pseudonym.trim(), body, new).await
+    check_for(db, reach, subject.pseudonym.trim(), body, new).await
 }
 
 /// Fills in the measured muscle values of the subject, unless the study sets muscles itself.
@@ -291,12 +270,18 @@ async fn with_own_muscles(db: &mut Connection, mut new: NewStudy) -> Result<NewS
     Ok(new)
 }
 
-async fn check(db: &mut Connection, new: NewStudy) -> Result<StudyPlan, Error> {
+async fn check(db: &mut Connection, reach: Reach, new: NewStudy) -> Result<StudyPlan, Error> {
     let subject = subjects::get(db, new.subject_id).await?;
-    check_for(db, &subject.pseudonym, subject.body(), new).await
+    check_for(db, reach, &subject.pseudonym, subject.body(), new).await
 }
 
-async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStudy) -> Result<StudyPlan, Error> {
+async fn check_for(
+    db: &mut Connection,
+    reach: Reach,
+    pseudonym: &str,
+    body: Body,
+    new: NewStudy,
+) -> Result<StudyPlan, Error> {
     let device_id = match new.device_id {
         Some(id) => devices::get(db, id).await?.id,
         None => built_in_entries::device(db).await?.id,
@@ -307,8 +292,8 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
     };
     let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {
-        None => format!("{}, {variant}, seed {}", pseudonym, new.seed),
-        Some(name) => printable::name("name", name, LONGEST_NAME)?.to_owned(),
+        None => study_name::free(db, reach, &format!("{}, {variant}, seed {}", pseudonym, new.seed)).await?,
+        Some(name) => study_name::checked(db, reach, name, None).await?,
     };
     let search_space = match new.search_space {
         Some(given) => given.checked()?,
@@ -347,7 +332,7 @@ async fn check_for(db: &mut Connection, pseudonym: &str, body: Body, new: NewStu
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
-    printable::name("name", &plan.name, LONGEST_NAME)?;
+    printable::name("name", &plan.name, study_name::LONGEST)?;
     check_range("number_of_trials", i64::from(plan.number_of_trials), 1, 10_000)?;
     check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(plan.priority), -10, 10)?;

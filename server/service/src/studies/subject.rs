@@ -41,14 +41,6 @@ pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &s
     Ok(body)
 }
 
-/// Checks the data of a new subject, without the record.
-///
-/// # Errors
-/// [`Error::Invalid`] naming the field.
-pub fn check_new(new: &NewSubject) -> Result<(), Error> {
-    check(new.pseudonym.trim(), new.height_m, new.body_mass_kg, &new.notes).map(drop)
-}
-
 /// Adds a subject.
 ///
 /// # Errors
@@ -108,11 +100,11 @@ pub async fn correct(
     new: &NewCorrection,
 ) -> Result<Correction, Error> {
     let before = subjects::get(writer, id).await?.body();
-    let body = Body::new(new.height_m, new.body_mass_kg)?;
-    let reason = printable::reason("reason", &new.reason, " and say why the values are corrected")?;
+    let body = check_correction(new)?;
     if body == before {
         return Err(Error::conflict("Height and mass already have these values."));
     }
+    let reason = new.reason.trim();
     let correction = subjects::correct(writer, actor, id, body, reason).await?;
     let detail = json!({
         "height_m": body.height_m, "body_mass_kg": body.body_mass_kg, "reason": reason,
@@ -120,6 +112,16 @@ pub async fn correct(
     });
     audit::append(writer, actor, "subject.correct", &format!("subject {id}"), &detail).await?;
     Ok(correction)
+}
+
+/// Checks the fields of a correction, without the record.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field.
+pub fn check_correction(new: &NewCorrection) -> Result<Body, Error> {
+    let body = Body::new(new.height_m, new.body_mass_kg)?;
+    printable::reason("reason", &new.reason, " and say why the values are corrected")?;
+    Ok(body)
 }
 
 /// Records measured muscle values that override the default ones. New studies use them.

@@ -177,7 +177,7 @@ impl ReproduceCommand {
             reference_gait_id: Some(reference),
             ..NewStudy::of(person.id)
         };
-        let wanted = study_plan::checked(&mut writer, new.clone()).await?;
+        let wanted = study_plan::checked(&mut writer, Reach::Every, new.clone()).await?;
         // A folder has at most two subjects, two variants and a hundred seeds.
         let known = studies::page(&mut writer, Reach::Every, &StudyFilter::newest(1000)).await?;
         commit(writer).await?;

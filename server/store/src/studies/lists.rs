@@ -67,17 +67,14 @@ pub async fn tags(db: &mut Connection, reach: Reach) -> StoreResult<Vec<String>>
     Ok(sqlx::query_scalar(sql).bind(every).bind(open).bind(principal).fetch_all(db).await?)
 }
 
-/// Whether another study that the caller reaches has this name. Studies out of reach do not count, because the answer
-/// would reveal their names.
+/// The names of the studies that a caller reaches, except that of one study.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn is_named(db: &mut Connection, reach: Reach, name: &str, except: Option<StudyId>) -> StoreResult<bool> {
+pub async fn names(db: &mut Connection, reach: Reach, except: Option<StudyId>) -> StoreResult<Vec<String>> {
     let (every, open, principal) = reach_values(reach);
-    let sql =
-        concat!("select 1 from studies where ", reached!("id"), " and name = ?4 and (?5 is null or id <> ?5) limit 1");
-    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(name).bind(except);
-    Ok(query.fetch_optional(db).await?.is_some())
+    let sql = concat!("select name from studies where ", reached!("id"), " and (?4 is null or id <> ?4)");
+    Ok(sqlx::query_scalar(sql).bind(every).bind(open).bind(principal).bind(except).fetch_all(db).await?)
 }
 
 /// The accessible studies with comparisons for raters, oldest first.

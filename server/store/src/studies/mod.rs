@@ -6,7 +6,7 @@ mod simulated_walks;
 mod study_state;
 
 pub use lists::{
-    StudyFilter, active, awaiting_raters, ended_before, is_named, of_subject, of_subject_with_safety_reports, open_of,
+    StudyFilter, active, awaiting_raters, ended_before, names, of_subject, of_subject_with_safety_reports, open_of,
     page, tags, waiting_for_people, with_safety_reports,
 };
 pub use plan::{AnswerSource, Evaluation, StudyPlan, WarmStartFrom};

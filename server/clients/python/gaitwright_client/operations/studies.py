@@ -234,7 +234,7 @@ class StudiesMethods(Transport):
     def get_recommendation_csv(self, study_id: StudyId) -> str:
         """Download the recommended bounds as CSV.
 
-        Each bound with its unit and what it limits.
+        Each bound with its side (`at least` or `at most`), its unit and what it limits.
         """
         return self.request_text("GET", "/api/v1/studies/{id}/recommendation.csv", {"id": study_id})
 

@@ -48,7 +48,9 @@ impl ReferenceChoice {
 fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> String {
     let known = matches.iter().filter(|found| found.distance.is_some()).count();
     let away = |found: &ReferenceGaitMatch| {
-        found.distance.map_or(String::new(), |distance| format!(" (distance {distance:.2})"))
+        found
+            .distance
+            .map_or(String::new(), |distance| format!(" (distance {distance:.2}, where 1 is 10 cm of height or 15 kg)"))
     };
     match matches.first() {
         _ if known == 0 => {

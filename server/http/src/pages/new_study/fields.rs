@@ -1,10 +1,11 @@
 //! The fields of the form for a new study: their defaults, those of a clone, and their labels.
 
-use crate::form_errors;
+use super::super::subjects::unused_pseudonym;
+use crate::refused_fields::{TypedForm, labels_of};
 use crate::units::Units;
 use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::TunedBounds;
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_store::StudyId;
 use gaitwright_store::studies::SimulatedWalksEffect;
 use serde::Deserialize;
@@ -119,10 +120,60 @@ impl NewStudyFields {
         let unknown = || Error::NotFound { what: "study".to_owned(), id: self.like.clone() };
         if self.like.is_empty() { Ok(None) } else { self.like.parse().map(Some).map_err(|_| unknown()) }
     }
+}
 
-    /// Puts an acceptable value in place of a refused one, to find the other fields that would be refused. Returns
-    /// whether there is one.
-    pub(super) fn repair(&mut self, field: &str) -> bool {
+impl TypedForm for NewStudyFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        let mut labels = labels_of(&[
+            ("subject", "Subject"),
+            ("pseudonym", "Pseudonym"),
+            ("height_m", "Height, m"),
+            ("body_mass_kg", "Body mass, kg"),
+            ("device", "Device"),
+            ("reference_gait", "Reference gait"),
+            ("muscles", "Variant"),
+        ]);
+        for bound in TunedBounds::NAMES {
+            labels.push((bound.to_owned(), bound.to_owned()));
+            for (part, label) in
+                [("tuned", "Tuned"), ("values", "Values"), ("lengthscale", "Lengthscale"), ("fixed", "Fixed value")]
+            {
+                labels.push((format!("{part}_{bound}"), format!("{label} of {bound}")));
+            }
+        }
+        labels.extend(labels_of(&[
+            ("answer_source", "Source of answers"),
+            ("number_of_trials", "Number of trials"),
+            ("name", "Name"),
+            ("learner", "Learner"),
+            ("unchanged_limit", "Stop early after"),
+            ("parallel_trials", "Parallel trials"),
+            ("seed", "Seed"),
+            ("simulated_walks.effect", "Simulated walks"),
+            ("simulated_walks.number", "Number of simulated walks on each ground"),
+            ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
+            ("simulated_walks.least_mean_strides", "Least mean number of strides"),
+            ("nearest_within_percent", "Objective tolerance, %"),
+        ]));
+        labels
+    }
+
+    /// A bound has one row in the table, whatever part of the study refuses it.
+    fn field_of(&self, refused: &str) -> String {
+        let last = refused.rsplit('.').next().filter(|last| TunedBounds::NAMES.contains(last));
+        match last.unwrap_or(refused) {
+            "device_id" => "device",
+            "reference_gait_id" => "reference_gait",
+            other => other,
+        }
+        .to_owned()
+    }
+
+    fn field_in_conflict(&self) -> Option<&'static str> {
+        Some(if self.subject == NEW_SUBJECT { "pseudonym" } else { "subject" })
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
         let default = Self::default();
         let is_new = self.subject == NEW_SUBJECT;
         let text = |new: &str| if is_new { new.to_owned() } else { String::new() };
@@ -161,13 +212,6 @@ impl NewStudyFields {
         }
         true
     }
-}
-
-/// A pseudonym that nobody uses: the letters of a fresh identifier.
-fn unused_pseudonym() -> String {
-    let hex = StudyId::fresh().to_string();
-    let letter = |c: char| char::from_digit(c.to_digit(16)? + 10, 36);
-    hex.chars().filter_map(letter).collect()
 }
 
 /// The learners to choose from: value, label, and when to choose it. The benchmarks of the learner support this advice.
@@ -211,79 +255,6 @@ pub(super) const NEW_SUBJECT: &str = "new";
 
 /// The fields that describe a new subject.
 pub(super) const DESCRIPTION: [&str; 3] = ["pseudonym", "height_m", "body_mass_kg"];
-
-/// The place of a field in the form.
-pub(super) fn place_in_form(field: &str) -> usize {
-    const BEFORE_BOUNDS: [&str; 7] =
-        ["subject", "pseudonym", "height_m", "body_mass_kg", "device", "reference_gait", "muscles"];
-    const AFTER_BOUNDS: [&str; 11] = [
-        "answer_source",
-        "number_of_trials",
-        "name",
-        "learner",
-        "unchanged_limit",
-        "parallel_trials",
-        "seed",
-        "simulated_walks.effect",
-        "simulated_walks.number",
-        "simulated_walks.gait_rmse_tolerance_rad",
-        "simulated_walks.least_mean_strides",
-    ];
-    let before = BEFORE_BOUNDS.iter().position(|known| *known == field);
-    let after = || AFTER_BOUNDS.iter().position(|known| *known == field).map(|place| place + BEFORE_BOUNDS.len() + 1);
-    before.or_else(after).unwrap_or(if field.len() < 4 || field.contains("_a") { 7 } else { usize::MAX })
-}
-
-/// The label of a field.
-fn label(field: &str) -> String {
-    let named = match field {
-        "name" => "Name",
-        "subject" => "Subject",
-        "pseudonym" => "Pseudonym",
-        "height_m" => "Height, m",
-        "body_mass_kg" => "Body mass, kg",
-        "device" | "device_id" => "Device",
-        "reference_gait" | "reference_gait_id" => "Reference gait",
-        "muscles" => "Variant",
-        "answer_source" => "Source of answers",
-        "number_of_trials" => "Number of trials",
-        "learner" => "Learner",
-        "unchanged_limit" => "Stop early after",
-        "parallel_trials" => "Parallel trials",
-        "seed" => "Seed",
-        "simulated_walks.effect" => "Simulated walks",
-        "simulated_walks.number" => "Number of simulated walks on each ground",
-        "simulated_walks.gait_rmse_tolerance_rad" => "Gait RMSE tolerance, rad",
-        "simulated_walks.least_mean_strides" => "Least mean number of strides",
-        "nearest_within_percent" => "Objective tolerance, %",
-        other => other,
-    };
-    match field.split_once('_') {
-        Some(("tuned", bound)) => format!("{bound} is tuned"),
-        Some(("values", bound)) => format!("Values of {bound}"),
-        Some(("lengthscale", bound)) => format!("Lengthscale of {bound}"),
-        Some(("fixed", bound)) => format!("Fixed value of {bound}"),
-        _ => named.to_owned(),
-    }
-}
-
-/// Converts an error about a field into a refusal; other errors pass.
-pub(super) fn as_refusal(error: Error, fields: &NewStudyFields) -> Result<FieldError, Error> {
-    match error {
-        Error::Invalid(refused) => {
-            // A bound has one row in the table, whatever part of the study refuses it.
-            let last = refused.field.rsplit('.').next().filter(|last| TunedBounds::NAMES.contains(last));
-            let field = last.unwrap_or(&refused.field).to_owned();
-            let message = form_errors::of_field(&label(&field), &refused);
-            Ok(FieldError { field, message, ..*refused })
-        }
-        Error::Conflict(message) => {
-            let field = if fields.subject == NEW_SUBJECT { "pseudonym" } else { "subject" };
-            Ok(FieldError::in_words(field, &message))
-        }
-        other => Err(other),
-    }
-}
 
 #[cfg(test)]
 mod tests {

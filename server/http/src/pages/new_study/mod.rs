@@ -8,7 +8,7 @@ mod tuned_and_fixed_bounds;
 
 use self::chosen_reference::ReferenceChoice;
 use self::clone::cloned;
-use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, WALKS_EFFECTS, as_refusal};
+use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, WALKS_EFFECTS};
 use self::planning::{faults, make};
 use self::tuned_and_fixed_bounds::SpaceEditor;
 use crate::AppState;
@@ -17,6 +17,7 @@ use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
+use crate::refused_fields::{FormCheck, RefusedFields};
 use crate::units::Units;
 use askama::Template;
 use axum::Json;
@@ -25,7 +26,7 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Redirect, Response};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::access::Run;
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::sample_study;
 use gaitwright_store::devices::Device;
 use gaitwright_store::reference_gaits::ReferenceGait;
@@ -71,7 +72,7 @@ struct NewStudyPage {
     fields: NewStudyFields,
     editor: SpaceEditor,
     /// Every refused field.
-    refused: Vec<FieldError>,
+    refused: RefusedFields,
     /// The study that is cloned.
     cloned: Option<Study>,
     /// The chosen reference gait, as a part of the page; empty if none is known yet.
@@ -86,28 +87,15 @@ impl NewStudyPage {
             || (self.fields.subject.is_empty() && subject.pseudonym == "paper-1")
     }
 
-    fn refuses(&self, field: &str) -> bool {
-        self.refused.iter().any(|refused| refused.field == field)
-    }
-
-    /// The attributes that mark a refused field and point to the reason. The first one gets the focus.
-    fn invalid(&self, field: &str) -> &'static str {
-        match self.refused.iter().position(|refused| refused.field == field) {
-            Some(0) => " aria-invalid=\"true\" aria-describedby=\"refused\" autofocus",
-            Some(_) => " aria-invalid=\"true\" aria-describedby=\"refused\"",
-            None => "",
-        }
-    }
-
     /// The learner of a cloned study, if the form cannot show its settings.
     fn keeps_learner(&self) -> bool {
         self.cloned.is_some() && self.fields.learner == KEPT
     }
 
-    /// The same for the table of bounds, where a bound can be refused as a whole.
+    /// The attributes of a field in the table of bounds, where a bound can be refused as a whole.
     fn invalid_part(&self, part: &str, bound: &str) -> &'static str {
-        let of_part = self.invalid(&format!("{part}_{bound}"));
-        if of_part.is_empty() { self.invalid(bound) } else { of_part }
+        let of_part = self.refused.invalid(&format!("{part}_{bound}"));
+        if of_part.is_empty() { self.refused.invalid(bound) } else { of_part }
     }
 
     /// Whether an entry of the table of bounds was refused, so that the table has to be shown.
@@ -118,7 +106,7 @@ impl NewStudyPage {
 
     /// Whether a new subject is entered, or one of its fields was refused.
     fn describes(&self) -> bool {
-        self.fields.subject == NEW_SUBJECT || DESCRIPTION.iter().any(|field| self.refuses(field))
+        self.fields.subject == NEW_SUBJECT || DESCRIPTION.iter().any(|field| self.refused.has(field))
     }
 
     /// Whether an expert setting was changed or refused, so that they have to be shown.
@@ -195,7 +183,7 @@ pub(super) async fn get(
         fields.relax(&preset.relax)?;
     }
     drop(reader);
-    show(&app, units, &authorized, fields, Vec::new(), None).await
+    show(&app, units, &authorized, fields, RefusedFields::default(), None).await
 }
 
 async fn show(
@@ -203,7 +191,7 @@ async fn show(
     units: Units,
     authorized: &Authorized<Run>,
     fields: NewStudyFields,
-    refused: Vec<FieldError>,
+    refused: RefusedFields,
     plan: Option<StudyPlan>,
 ) -> PageResult {
     let mut reader = app.read().await?;
@@ -265,12 +253,14 @@ pub(super) async fn post(
             app.scheduler.changed();
             return Ok(Redirect::to(&format!("/studies/{}", study.id)).into_response());
         }
-        Err(error) => as_refusal(error, &fields)?,
+        Err(error) => error,
     };
     drop(writer);
     let (mut refused, plan) = faults(&mut *app.read().await?, authorized.caller.reach(), &fields).await?;
     if refused.is_empty() {
-        refused.push(first);
+        let mut check = FormCheck::new(&fields);
+        check.refuse(first)?;
+        refused = check.into_refused();
     }
     let form = show(&app, units, &authorized, fields, refused, plan).await?;
     Ok((StatusCode::UNPROCESSABLE_ENTITY, form).into_response())
@@ -321,7 +311,7 @@ pub(super) async fn check(
         None => None,
     };
     drop(reader);
-    let faults = found.into_iter().map(|fault| Fault { field: fault.field, text: fault.message }).collect();
+    let faults = found.iter().map(|fault| Fault { field: fault.field.clone(), text: fault.message.clone() }).collect();
     Ok(Json(CheckedForm { faults, text, reference: choice.map(|choice| choice.shown()).transpose()? }))
 }
 

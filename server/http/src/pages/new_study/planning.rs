@@ -1,16 +1,18 @@
 //! The study that the form describes: checked, planned and created.
 
 use super::clone::cloned;
-use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, as_refusal, learner, place_in_form};
+use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, learner};
 use super::tuned_and_fixed_bounds::SpaceEditor;
+use crate::refused_fields::{FormCheck, RefusedFields};
 use gait_optimizer::{LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
-use gaitwright_service::error::{Error, FieldError};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::seed;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
 use gaitwright_store::studies::{AnswerSource, SimulatedWalks, SimulatedWalksEffect, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
+use std::ops::ControlFlow;
 use std::str::FromStr;
 
 /// Creates the study, and the subject if a new one is entered.
@@ -25,10 +27,7 @@ pub(super) async fn make(
         StudySubject::New(new) => subject::add(writer, &caller.actor, &new).await?.id,
         StudySubject::Known(id) => id,
     };
-    let mut new = study_of(fields, editor, subject, like.as_ref())?;
-    let plan = study_plan::checked(writer, new.clone()).await?;
-    new.name = Some(name_of(writer, caller.reach(), fields, &plan).await?);
-    study_plan::create_by(writer, caller, new).await
+    study_plan::create_by(writer, caller, study_of(fields, editor, subject, like.as_ref())?).await
 }
 
 /// The study that [`make`] would create.
@@ -39,18 +38,16 @@ async fn planned(
     editor: &SpaceEditor,
 ) -> Result<StudyPlan, Error> {
     let like = cloned(db, reach, fields).await?;
-    let plan = match subject_of(fields)? {
+    match subject_of(fields)? {
         StudySubject::New(new) => {
             let study = study_of(fields, editor, SubjectId::fresh(), like.as_ref())?;
-            study_plan::checked_for_new(db, &new, study).await?
+            study_plan::checked_for_new(db, reach, &new, study).await
         }
         StudySubject::Known(id) => {
             consents::has_not_withdrawn(db, id).await?;
-            study_plan::checked(db, study_of(fields, editor, id, like.as_ref())?).await?
+            study_plan::checked(db, reach, study_of(fields, editor, id, like.as_ref())?).await
         }
-    };
-    let name = name_of(db, reach, fields, &plan).await?;
-    Ok(StudyPlan { name, ..plan })
+    }
 }
 
 /// Every field that would be refused, and the plan with acceptable values in their place, if there is one.
@@ -58,41 +55,16 @@ pub(super) async fn faults(
     db: &mut Connection,
     reach: Reach,
     fields: &NewStudyFields,
-) -> Result<(Vec<FieldError>, Option<StudyPlan>), Error> {
-    let mut repaired = fields.clone();
-    let mut found: Vec<FieldError> = Vec::new();
+) -> Result<(RefusedFields, Option<StudyPlan>), Error> {
+    let mut check = FormCheck::new(fields);
     let plan = loop {
-        let editor = SpaceEditor::typed(&repaired.space)?;
-        let fault = match planned(db, reach, &repaired, &editor).await {
-            Ok(plan) => break Some(plan),
-            Err(error) => as_refusal(error, &repaired)?,
-        };
-        if found.iter().any(|known| known.field == fault.field) {
-            break None;
-        }
-        let goes_on = repaired.repair(&fault.field);
-        found.push(fault);
-        if !goes_on {
-            break None;
+        let editor = SpaceEditor::typed(&check.form().space)?;
+        let read = planned(db, reach, check.form(), &editor).await;
+        if let ControlFlow::Break(plan) = check.step(read)? {
+            break plan;
         }
     };
-    found.sort_by_key(|fault| place_in_form(&fault.field));
-    Ok((found, plan))
-}
-
-/// The name of the study. A typed name must differ from those of the studies that the caller can see; the default name
-/// gets a number if it is taken.
-async fn name_of(
-    db: &mut Connection,
-    reach: Reach,
-    fields: &NewStudyFields,
-    plan: &StudyPlan,
-) -> Result<String, Error> {
-    let free = study_plan::free_name(db, reach, &plan.name).await?;
-    if fields.name.trim().is_empty() || free == plan.name {
-        return Ok(free);
-    }
-    Err(study_plan::name_is_taken(&plan.name, &free))
+    Ok((check.into_refused(), plan))
 }
 
 /// The subject of the study.

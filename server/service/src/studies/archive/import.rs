@@ -1,9 +1,10 @@
 //! Imports an archive into the record.
 
-use super::super::built_in_entries;
+use super::super::{built_in_entries, study_name};
 use super::archive_file::{ArchiveFacts, Next, Unpacker, refuse};
 use super::check;
 use super::signature::PublicKey;
+use crate::access::Reach;
 use crate::error::Error;
 use gaitwright_compute::Pool;
 use gaitwright_store::archived_row::{Cell, Row};
@@ -89,7 +90,7 @@ pub async fn open<R: Read + Send + 'static>(from: R, trusted: &[PublicKey]) -> R
     Ok(Archive { quarantine, study: checked.study, origin })
 }
 
-/// Writes the study of an archive and its origin into a record.
+/// Writes the study of an archive and its origin into a record. If a study here has its name, a number is added.
 ///
 /// # Errors
 /// [`Error::Conflict`] if the record has the study already, or contradicts it. Nothing is changed then.
@@ -132,6 +133,8 @@ async fn copy(quarantine: &mut Quarantine, study: StudyId, writer: &mut Writer, 
         while let Some(archived_rows::Read { table, mut row, .. }) = rows.recv().await {
             if table == "studies" {
                 row.set("cloned_from", cloned_from.clone().map_or(Cell::Null, Cell::Text));
+                let name = row.text("name").unwrap_or_default().to_owned();
+                row.set("name", Cell::Text(study_name::free(writer, Reach::Every, &name).await?));
             }
             if table == "imports" && !trusted {
                 // No signature vouches for the earlier signatures that the archive lists.

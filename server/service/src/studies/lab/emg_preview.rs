@@ -19,8 +19,8 @@ pub struct EmgPreview {
     pub traces: Vec<Trace>,
     /// The strides between the heel strikes; empty if heel strikes are unknown.
     pub strides: Vec<Stride>,
-    /// Why the file would be refused as it is; `None` if it would be accepted.
-    pub refused: Option<Error>,
+    /// Why the file would be refused as it is; empty if it would be accepted.
+    pub refused: Vec<Error>,
 }
 
 /// The raw trace of a channel.
@@ -89,7 +89,7 @@ impl NewEmg {
         Ok(EmgPreview {
             traces: CHANNELS.into_iter().filter_map(trace).collect(),
             strides: (1..).zip(strides_between(&strikes)).map(stride).collect(),
-            refused: self.reading.check(&self.recording).err(),
+            refused: self.reading.faults(&self.recording),
             columns: whole.channels.into_iter().map(|(name, _)| name).collect(),
         })
     }
@@ -152,6 +152,7 @@ mod tests {
     fn preview_without_heel_strikes_asks_for_their_times() {
         let shown = recording(Vec::new()).preview().unwrap();
         assert!(shown.strides.is_empty() && shown.traces.len() == 2);
-        assert!(shown.refused.unwrap().to_string().contains("at least two heel-strike times"));
+        let faults: Vec<String> = shown.refused.iter().map(Error::to_string).collect();
+        assert!(matches!(&faults[..], [one] if one.contains("at least two heel-strike times")), "{faults:?}");
     }
 }

@@ -1,7 +1,8 @@
 //! How to read an EMG recording: channels, heel strikes, and the strides to leave out.
 
 use super::file_format::{MeasurementFormat, WHAT, check_file_name};
-use crate::error::Error;
+use crate::error::{Error, FieldError};
+use gait_optimizer::ModelError;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -54,19 +55,28 @@ impl EmgReading {
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
     pub fn read(&self, what: &str, text: &str) -> Result<(EmgRecording, Vec<f64>), Error> {
-        if let Some(unknown) = self.channels.keys().find(|name| !CHANNELS.contains(&name.as_str())) {
-            return Err(Error::invalid(
-                "reading.channels",
-                unknown.as_str(),
-                &format!("one of {}", CHANNELS.join(", ")),
-            ));
-        }
+        self.check_names()?;
         let whole = self.whole(what, text)?;
-        let same = CHANNELS.map(|name| (name, name));
-        let named = self.channels.iter().map(|(channel, column)| (channel.as_str(), column.as_str()));
-        let recording = if self.channels.is_empty() { whole.select(what, same)? } else { whole.select(what, named)? };
-        let strikes = self.strikes(what, &whole)?;
-        Ok((recording, strikes))
+        Ok((self.selected(what, &whole)?, self.strikes(what, &whole)?))
+    }
+
+    /// Checks the names of the channels.
+    fn check_names(&self) -> Result<(), Error> {
+        match self.channels.keys().find(|name| !CHANNELS.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(unknown) => {
+                let allowed = format!("one of {}", CHANNELS.join(", "));
+                Err(Error::invalid("reading.channels", unknown.as_str(), &allowed))
+            }
+        }
+    }
+
+    /// The columns of the channels.
+    fn selected(&self, what: &str, whole: &EmgRecording) -> Result<EmgRecording, ModelError> {
+        if self.channels.is_empty() {
+            return whole.select(what, CHANNELS.map(|name| (name, name)));
+        }
+        whole.select(what, self.channels.iter().map(|(channel, column)| (channel.as_str(), column.as_str())))
     }
 
     /// Every column of the file.
@@ -101,9 +111,48 @@ impl EmgReading {
 
     /// Checks that a file has EMG signals and can be cut into strides, for any filter settings.
     pub(super) fn check(&self, text: &str) -> Result<(), Error> {
-        check_file_name(self.file_name.as_deref())?;
-        let (recording, strikes) = self.read(WHAT, text)?;
-        let strides = self.kept_strides(&strikes)?;
+        self.faults(text).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Everything that speaks against a file, as far as one fault does not hide another one.
+    pub(super) fn faults(&self, text: &str) -> Vec<Error> {
+        let mut faults: Vec<Error> = check_file_name(self.file_name.as_deref()).err().into_iter().collect();
+        let whole = self.whole(WHAT, text).or_else(|error| {
+            let is_of_rate = matches!(&error, Error::Invalid(fault) if fault.field.ends_with("rate_hz"));
+            faults.push(error);
+            // Without the wrong rate, the rest of a file with a time column can be checked.
+            if is_of_rate { Self { rate_hz: None, ..self.clone() }.whole(WHAT, text).map_err(drop) } else { Err(()) }
+        });
+        let Ok(whole) = whole else { return faults };
+        let selected = self.check_names().and_then(|()| {
+            let of_channels = |error| FieldError::from(error).renamed(WHAT, "reading.channels").into();
+            self.selected(WHAT, &whole).map_err(of_channels)
+        });
+        let strikes = self.strikes(WHAT, &whole).map_err(|error| match error {
+            Error::Invalid(fault) => {
+                let of_column = self.heel_strike_column.is_some();
+                let field = if of_column { "reading.heel_strike_column" } else { "reading.heel_strikes_s" };
+                fault.renamed(WHAT, field).into()
+            }
+            other => other,
+        });
+        let checked = match (selected, strikes) {
+            (Ok(recording), Ok(strikes)) => self.check_strides(recording, &strikes),
+            (Ok(recording), Err(of_strikes)) => {
+                faults.extend(recording.check_channels().err().map(Error::from));
+                Err(of_strikes)
+            }
+            (Err(of_channels), strikes) => {
+                faults.push(of_channels);
+                strikes.map(drop)
+            }
+        };
+        faults.extend(checked.err());
+        faults
+    }
+
+    fn check_strides(&self, recording: EmgRecording, strikes: &[f64]) -> Result<(), Error> {
+        let strides = self.kept_strides(strikes)?;
         recording.check_channels()?;
         for (channel, values) in recording.channels {
             let raw = Envelope { channel, start_s: recording.start_s, rate_hz: recording.rate_hz, values };

@@ -18,8 +18,8 @@ pub struct JointAnglePreview {
     pub strikes_s: Vec<f64>,
     /// The strides between them.
     pub strides: Vec<RecordedStride>,
-    /// Why the file would be refused as it is; `None` if it would be accepted.
-    pub refused: Option<Error>,
+    /// Why the file would be refused as it is; empty if it would be accepted.
+    pub refused: Vec<Error>,
 }
 
 impl NewJointAngles {
@@ -34,7 +34,7 @@ impl NewJointAngles {
             (*joint, extremes(angles).into_iter().map(point).collect())
         };
         let (strikes_s, strides) = strides(&recording).unwrap_or_default();
-        let refused = self.reading.check(&self.recording).err();
+        let refused = self.reading.faults(&self.recording);
         Ok(JointAnglePreview { traces: recording.joints.iter().map(trace).collect(), strikes_s, strides, refused })
     }
 }
@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn preview_has_traces_and_heel_strikes_found_from_the_angles() {
         let shown = recording("torso_rad,hip_R_rad,knee_R_rad").preview().unwrap();
-        assert!(shown.refused.is_none(), "{:?}", shown.refused);
+        assert!(shown.refused.is_empty(), "{:?}", shown.refused);
         assert_eq!(shown.traces.iter().map(|(joint, _)| *joint).collect::<Vec<_>>(), ["torso", "hip_R", "knee_R"]);
         assert!(shown.strikes_s.len() >= 8, "{:?}", shown.strikes_s);
         assert!(shown.strides.iter().all(|stride| (stride.end_s - stride.start_s - 1.2).abs() < 0.03));

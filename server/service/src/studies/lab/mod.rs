@@ -32,8 +32,8 @@ pub use measurement_results::{
 };
 pub use question::{AnswerView, WALKS};
 pub use session::{
-    LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, gaits_to_plan_with, gaits_to_walk_with, plan,
-    record_walk, session_progress, still_open, was_recorded,
+    GaitsToPlanWith, LabSessionProgress, NewLabSession, RecordedWalk, checked_walk, close, gaits_to_plan_with,
+    gaits_to_walk_with, plan, record_walk, session_progress, still_open, was_recorded,
 };
 pub use session_name::name_in_lab;
 pub use session_view::{LabSessionState, LabSessionView, WalkCondition, WalkView};

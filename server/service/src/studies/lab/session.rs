@@ -43,11 +43,20 @@ pub(super) fn checked_device_walk(walk: u8) -> Result<u8, Error> {
     }
 }
 
-/// The walkable gaits of a study, each motion once, among the `limit` converged trials of lowest Gait RMSE, lowest first.
+/// The gaits of a study for a lab session, each motion once.
+#[derive(Debug, Default)]
+pub struct GaitsToPlanWith {
+    /// The walkable ones.
+    pub walkable: Vec<ListedTrial>,
+    /// Those that lack nothing but a certificate.
+    pub without_certificate: Vec<ListedTrial>,
+}
+
+/// The gaits of a study for a lab session, among the `limit` converged trials of lowest Gait RMSE, lowest first.
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<Vec<ListedTrial>> {
+pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32) -> StoreResult<GaitsToPlanWith> {
     let listing = Listing {
         sort: "gait_rmse_rad",
         descending: false,
@@ -57,14 +66,28 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
         start: Start::First,
     };
     let grounds = Grounds::read(db, study).await?;
-    let mut kept: Vec<(ListedTrial, Trial)> = Vec::new();
+    let mut converged = Vec::new();
     for listed in trial_list::of_study(db, study, &listing).await? {
         let trial = trials::get(db, listed.id).await?;
-        if grounds.admit(&trial).is_ok() && !kept.iter().any(|(_, other)| is_same_gait(other, &trial)) {
-            kept.push((listed, trial));
-        }
+        converged.push((listed, trial));
     }
-    Ok(kept.into_iter().map(|(listed, _)| listed).collect())
+    // A walkable gait stands for equal ones without a certificate.
+    converged.sort_by_key(|(_, trial)| grounds.admit(trial).is_err());
+    let (mut found, mut kept) = (GaitsToPlanWith::default(), Vec::<Trial>::new());
+    for (listed, trial) in converged {
+        if kept.iter().any(|other| is_same_gait(other, &trial)) {
+            continue;
+        }
+        if grounds.admit(&trial).is_ok() {
+            found.walkable.push(listed);
+        } else if grounds.may_become_walkable(&trial) {
+            found.without_certificate.push(listed);
+        } else {
+            continue;
+        }
+        kept.push(trial);
+    }
+    Ok(found)
 }
 
 /// The two gaits of a session for the next walk, gait A first.

@@ -19,8 +19,8 @@ pub enum WalkCondition {
     GaitB,
 }
 
-/// State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `closed`, the
-/// session accepts no more data.
+/// State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `answered`, the
+/// subject has answered, so no walk is left; `closed`, the session accepts no more data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LabSessionState {
@@ -28,6 +28,8 @@ pub enum LabSessionState {
     Planned,
     /// At least one walk is recorded.
     UnderWay,
+    /// The subject has answered, so no walk is left.
+    Answered,
     /// The session accepts no more data.
     Closed,
 }
@@ -38,6 +40,7 @@ impl LabSessionState {
         match self {
             Self::Planned => "planned",
             Self::UnderWay => "under_way",
+            Self::Answered => "answered",
             Self::Closed => "closed",
         }
     }
@@ -45,6 +48,8 @@ impl LabSessionState {
     fn of(session: &LabSession) -> Self {
         if session.done(SessionStep::Closed).is_some() {
             Self::Closed
+        } else if session.answer().is_some() {
+            Self::Answered
         } else if session.done(SessionStep::Walk(1)).is_some() {
             Self::UnderWay
         } else {

@@ -11,7 +11,7 @@ use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::SessionStep;
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind, PackedFile};
-use gaitwright_store::{Connection, LabSessionId, MeasurementFileId, PackedText, Store, Writer};
+use gaitwright_store::{Connection, LabSessionId, MeasurementFileId, PackedText, Store, StoreResult, Writer};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use utoipa::ToSchema;
@@ -73,9 +73,20 @@ impl JointAngleReading {
 
     /// Checks that a file gives a limit cycle and limit cycles with these settings.
     pub(super) fn check(&self, text: &str) -> Result<(), Error> {
-        check_file_name(self.file_name.as_deref())?;
-        self.joints(text)?.check_walking(WHAT)?;
-        self.limit_cycles(text).map(|_| ())
+        self.faults(text).into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Everything that speaks against a file, as far as one fault does not hide another one.
+    pub(super) fn faults(&self, text: &str) -> Vec<Error> {
+        let name = check_file_name(self.file_name.as_deref());
+        let walking = self.joints(text).and_then(|joints| Ok(joints.check_walking(WHAT)?));
+        // A file that cannot be read hides its limit of the cut-off.
+        let cutoff = match self.limit_cycles(text) {
+            Err(Error::Invalid(fault)) if fault.field != WHAT => Err(Error::Invalid(fault)),
+            Err(error) if walking.is_ok() => Err(error),
+            _ => Ok(()),
+        };
+        [name, walking, cutoff].into_iter().filter_map(Result::err).collect()
     }
 }
 
@@ -106,11 +117,18 @@ impl NewEmg {
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
     pub async fn checked(self, store: &mut Store) -> Result<CheckedFile, Error> {
+        self.checked_wholly(store).await?.map_err(first)
+    }
+
+    /// The same with every fault, for forms.
+    ///
+    /// # Errors
+    /// If the file cannot be packed.
+    pub async fn checked_wholly(self, store: &mut Store) -> Result<Result<CheckedFile, Vec<Error>>, Error> {
         let check = move |pool: &OnPool| {
-            let walk = checked_walk(self.walk)?;
-            self.reading.check(&self.recording)?;
-            let packed = PackedFile::new(pool, MeasurementKind::Emg, &self.reading, &self.recording)?;
-            Ok(CheckedFile { walk, packed })
+            let faults = self.reading.faults(&self.recording);
+            let pack = || PackedFile::new(pool, MeasurementKind::Emg, &self.reading, &self.recording);
+            checked(self.walk, faults, pack)
         };
         store.compute(check).await?
     }
@@ -122,14 +140,35 @@ impl NewJointAngles {
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
     pub async fn checked(self, store: &mut Store) -> Result<CheckedFile, Error> {
+        self.checked_wholly(store).await?.map_err(first)
+    }
+
+    /// The same with every fault, for forms.
+    ///
+    /// # Errors
+    /// If the file cannot be packed.
+    pub async fn checked_wholly(self, store: &mut Store) -> Result<Result<CheckedFile, Vec<Error>>, Error> {
         let check = move |pool: &OnPool| {
-            let walk = checked_walk(self.walk)?;
-            self.reading.check(&self.recording)?;
-            let packed = PackedFile::new(pool, MeasurementKind::JointAngles, &self.reading, &self.recording)?;
-            Ok(CheckedFile { walk, packed })
+            let faults = self.reading.faults(&self.recording);
+            let pack = || PackedFile::new(pool, MeasurementKind::JointAngles, &self.reading, &self.recording);
+            checked(self.walk, faults, pack)
         };
         store.compute(check).await?
     }
+}
+
+fn checked(
+    walk: u8,
+    faults: Vec<Error>,
+    pack: impl FnOnce() -> StoreResult<PackedFile>,
+) -> Result<Result<CheckedFile, Vec<Error>>, Error> {
+    let faults: Vec<Error> = checked_walk(walk).err().into_iter().chain(faults).collect();
+    if faults.is_empty() { Ok(Ok(CheckedFile { walk, packed: pack()? })) } else { Ok(Err(faults)) }
+}
+
+/// The first fault, for requests of programs.
+fn first(faults: Vec<Error>) -> Error {
+    faults.into_iter().next().unwrap_or_else(|| Error::Internal("a file was refused without a reason".to_owned()))
 }
 
 /// Checks a stored measurement file like a new upload.

@@ -37,9 +37,9 @@ pub(super) async fn answers(
         let Some(compared) = pair(&row.content).filter(|_| is_of_person(row) && !of_reports.contains(&row.id)) else {
             continue;
         };
-        let author = printable::person(&row.author);
+        let author = printable::compared(&row.author);
         let walked = sessions.iter().filter(|session| sorted(session.trial_a, session.trial_b) == compared).count();
-        let most = if author == printable::person(subject) { 1 + walked } else { 1 };
+        let most = if author == printable::compared(subject) { 1 + walked } else { 1 };
         let count = answered.entry((compared, author)).or_default();
         *count += 1;
         if *count > most {
