@@ -106,8 +106,8 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     }
     let recommended = format!("/api/v1/studies/{}/recommendation", studies[0]);
     let (best, bounds) = (service.fetch(&recommended).await.json(), service.fetch(&format!("{recommended}.csv")).await);
-    let row = format!("a5,{},m,swing-foot clearance,passed\n", best["bounds"]["a5"]);
-    let header = "bound,value,unit,limits,certificate_of_the_gait\n";
+    let row = format!("a5,at least,{},m,swing-foot clearance,passed\n", best["bounds"]["a5"]);
+    let header = "bound,side,value,unit,limits,certificate_of_the_gait\n";
     assert!(bounds.text.starts_with(header) && bounds.text.contains(&row), "{}", bounds.text);
     for unknown in ["nothing.svg", "course.gif", "course", "..%2Fa.svg"] {
         let path = format!("/api/v1/studies/{}/figures/{unknown}", studies[0]);

@@ -602,7 +602,7 @@ async fn comparison_of_studies_with_answers_of_people_leads_with_these_answers()
     assert!(place("about this gait") < place(": utility of the recommended gait</h3>"));
     assert!(place(": utility of the recommended gait</h3>") < place("Gait RMSE of the best action by iteration</h3>"));
     let same = service.fetch(&format!("/studies/compare?a={people}&b={people}")).await;
-    is_page(&same, StatusCode::OK, "Study A and study B are the same. Choose two different studies.");
+    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Study B\u{201d} is the same study as study A.");
     service.stop().await;
 }
 

@@ -1,11 +1,10 @@
 //! The page of all lab sessions of a study, with the form that plans one.
 
-use super::lab_session_state::state_in_words;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
-use crate::format;
+use crate::format::{self, words};
 use crate::page_error::{PageError, PageResult, page};
 use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
 use crate::visible::Visible;
@@ -116,7 +115,7 @@ async fn show(
     let named = |trial: ListedTrial| (trial.id, label(&trial, best, study.plan.answer_source));
     let shown = |session| {
         let view = LabSessionView::from(&session);
-        let (name_in_lab, state) = (lab::name_in_lab(view.id), state_in_words(&view));
+        let (name_in_lab, state) = (lab::name_in_lab(view.id), words(view.state.as_str()));
         (view, name_in_lab, state)
     };
     page(&SessionsPage {

@@ -1,6 +1,5 @@
 //! The page of a lab session with its walks and measurements.
 
-use super::lab_session_state::state_in_words;
 use super::measurement_forms::{FilterFields, Forms};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
@@ -9,7 +8,7 @@ use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
-use crate::format;
+use crate::format::{self, words};
 use crate::page_error::{PageError, PageResult, page};
 use crate::refused_fields::RefusedFields;
 use crate::visible::Visible;
@@ -207,7 +206,7 @@ pub(super) async fn show(
     page(&SessionPage {
         study,
         name_in_lab: lab::name_in_lab(session.id),
-        state: state_in_words(&session),
+        state: words(session.state.as_str()),
         gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
         walks: session
             .walks

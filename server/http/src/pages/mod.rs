@@ -20,7 +20,6 @@ mod home;
 mod jobs;
 mod joint_peaks;
 mod lab_plan;
-mod lab_session_state;
 mod lab_sessions;
 mod lab_tablet;
 mod measurement_files;
