@@ -51,7 +51,7 @@ const STRIDES_BEFORE_PUSH: f64 = 3.2;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExecutionOptions {
-    /// Number of simulated walks on each ground, 1 to [`Self::MOST_SIMULATED_WALKS`].
+    /// Number of simulated walks on each kind of ground, 1 to [`Self::MOST_SIMULATED_WALKS`].
     pub simulated_walks: u32,
     /// Strides of a complete walk, 1 to 1000.
     pub strides: u32,

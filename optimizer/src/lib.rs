@@ -5,12 +5,12 @@
 //! the gait, explains bounds without a gait, and reads recordings. It does no learning, storage or HTTP.
 
 pub mod activation_alternations;
-mod angle_unit;
 pub mod body;
 mod cancel_token;
 pub mod certificate;
 pub mod cost_of_transport;
 pub mod device;
+mod display_angle_unit;
 pub mod emg;
 pub mod execution;
 pub mod explanation;
@@ -38,8 +38,8 @@ mod table;
 pub mod tuned_bounds;
 pub mod walking;
 
-pub use angle_unit::AngleUnit;
 pub use device::{Device, DeviceField};
+pub use display_angle_unit::DisplayAngleUnit;
 pub use gait::{DomainTrajectory, Gait};
 pub use gait_problem::margins::Margins;
 pub use gait_problem::{GaitProblem, UnchangedBound};

@@ -163,7 +163,9 @@ fn strides_with_gaps_are_dropped() {
     let text = format!("{header}lumbar_extension\tright_vy\n{}\n", kept.join("\n"));
     let given = HeelStrikes::Given(vec![0.0, 1.1, 2.2, 3.3, 4.4]);
     let reference = read(&text).unwrap().reference("x", &given, MeasuredPerson::default()).unwrap();
-    assert!(reference.provenance.contains("mean of 3 strides of 0.8 to 1.6 s, without gaps above 0.1 s (1 dropped)"));
+    assert!(
+        reference.provenance.contains("mean of 3 strides of 0.8 to 1.6 s, without gaps longer than 0.1 s (1 dropped)")
+    );
     assert!(reference.provenance.contains("5 right heel strikes given: 0.0000, 1.1000, 2.2000, 3.3000, 4.4000 s"));
     let of_whole = read(&whole).unwrap().reference("x", &given, MeasuredPerson::default()).unwrap();
     for (ours, theirs) in reference.angles_rad.iter().flatten().zip(of_whole.angles_rad.iter().flatten()) {
@@ -435,7 +437,7 @@ fn impossible_mean_strides_are_rejected() {
         ),
         (
             |angles| with_knee(angles, 0.25 * angles[2]),
-            "knee_L_rad bends to at most 16.5° in the stride; at least 20° is plausible; check the sign and the unit",
+            "knee_L_rad has a peak flexion of only 16.5° in the stride; at least 20° is expected; check the sign and the unit",
         ),
         (
             |angles| with_knee(angles, angles[2] + 0.8),

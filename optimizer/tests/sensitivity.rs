@@ -89,7 +89,7 @@ fn derivatives_agree_with_solves_of_moved_bounds() {
         }
         compared += 1;
     }
-    for sentence in found.sentences(gait_optimizer::AngleUnit::Radian) {
+    for sentence in found.sentences(gait_optimizer::DisplayAngleUnit::Radian) {
         println!("{sentence}");
     }
     assert!(compared >= 2, "{compared}");

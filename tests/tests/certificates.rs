@@ -295,7 +295,10 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
     let listed = service.fetch("/api/v1/jobs?kind=execution_report").await.items();
     assert_eq!((&listed[0]["trial_id"], listed[0]["progress"].is_number()), (&json!(trial.id), true), "{listed}");
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("1000 simulated walks on each ground with seed 1 are running") && page.contains("<progress"));
+    assert!(
+        page.contains("1000 simulated walks on each kind of ground with seed 1 are running")
+            && page.contains("<progress")
+    );
     assert!(page.contains("followed_jobs.mjs") && !page.contains("/execution-report\""), "{page}");
     let other = service.post(&address, &json!({"simulated_walks": 2})).await;
     assert_eq!(other.status, StatusCode::CONFLICT, "{}", other.text);
@@ -315,7 +318,7 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;
     until(&service, "running").await;
     let page = service.fetch(&format!("/trials/{}", trial.id)).await.text;
-    assert!(page.contains("1000 simulated walks on each ground with seed 2"), "{page}");
+    assert!(page.contains("1000 simulated walks on each kind of ground with seed 2"), "{page}");
     service.post(&format!("{job}/cancel"), &json!({})).await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;

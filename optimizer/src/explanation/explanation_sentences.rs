@@ -2,7 +2,7 @@
 
 use super::given_bound::BoundValue;
 use super::{BoundAtLimit, Conflict, Explanation, JointRelaxation, Relaxation};
-use crate::angle_unit::AngleUnit;
+use crate::display_angle_unit::DisplayAngleUnit;
 use crate::number_format::{figure, with_unit};
 use crate::solve::{SolveStatus, Violation};
 use crate::tuned_bounds::TunedBounds;
@@ -23,11 +23,11 @@ pub fn status_in_words(status: SolveStatus) -> Option<&'static str> {
 }
 
 /// A bound with its value: `a7 = 5° (hip angle)`.
-pub fn quantity(bound: &str, value: f64, angles: AngleUnit) -> String {
+pub fn quantity(bound: &str, value: f64, angles: DisplayAngleUnit) -> String {
     format!("{bound} = {} ({})", in_unit(bound, value, angles), TunedBounds::quantity_of(bound))
 }
 
-fn in_unit(bound: &str, value: f64, angles: AngleUnit) -> String {
+fn in_unit(bound: &str, value: f64, angles: DisplayAngleUnit) -> String {
     angles.in_words(value, TunedBounds::unit_of(bound))
 }
 
@@ -51,7 +51,7 @@ impl Violation {
         with_unit(figure(self.amount), &self.unit)
     }
 
-    fn amount_in(&self, angles: AngleUnit) -> String {
+    fn amount_in(&self, angles: DisplayAngleUnit) -> String {
         let is_shown_as_stored = angles.of(&self.unit) == self.unit;
         if is_shown_as_stored { self.amount_in_words() } else { angles.in_words(self.amount, &self.unit) }
     }
@@ -59,7 +59,7 @@ impl Violation {
 
 impl BoundAtLimit {
     /// The domains in which the bound is reached, as a sentence.
-    pub fn in_words(&self, angles: AngleUnit) -> String {
+    pub fn in_words(&self, angles: DisplayAngleUnit) -> String {
         let quantity = quantity(&self.bound, self.value, angles);
         if self.domains.len() == CYCLE.len() {
             return format!("{quantity} is reached in every domain.");
@@ -89,7 +89,7 @@ fn caveat(undecided: bool) -> &'static str {
 
 impl Conflict {
     /// The conflicting bounds and the violated constraint, as sentences.
-    pub fn in_words(&self, angles: AngleUnit) -> String {
+    pub fn in_words(&self, angles: DisplayAngleUnit) -> String {
         let quantities: Vec<String> = self.bounds.iter().map(|one| one.in_words(angles)).collect();
         let without = match self.without.len() {
             0 => String::new(),
@@ -138,14 +138,14 @@ impl Conflict {
 
 impl BoundValue {
     /// `a7 = 5° (hip angle)`.
-    fn in_words(&self, angles: AngleUnit) -> String {
+    fn in_words(&self, angles: DisplayAngleUnit) -> String {
         quantity(&self.bound, self.value, angles)
     }
 }
 
 impl Relaxation {
     /// The effect of the relaxation, as a sentence.
-    pub fn in_words(&self, angles: AngleUnit) -> String {
+    pub fn in_words(&self, angles: DisplayAngleUnit) -> String {
         let Self { bound, from, to, not_with, .. } = self;
         let limited = TunedBounds::quantity_of(bound);
         let in_unit = |value: f64| in_unit(bound, value, angles);
@@ -168,7 +168,7 @@ impl Relaxation {
 
 impl JointRelaxation {
     /// The effect of the relaxation, as a sentence.
-    pub fn in_words(&self, angles: AngleUnit) -> String {
+    pub fn in_words(&self, angles: DisplayAngleUnit) -> String {
         let (starts, caveat) = (from_starts(self.starts), caveat(self.undecided));
         let named =
             |value: &dyn Fn(&super::RelaxedBound) -> String| list(&self.bounds.iter().map(value).collect::<Vec<_>>());
@@ -192,7 +192,7 @@ impl JointRelaxation {
 
 impl BoundValue {
     /// The limit in words: `a hip angle of at most 15°`.
-    fn limit_in_words(&self, angles: AngleUnit) -> String {
+    fn limit_in_words(&self, angles: DisplayAngleUnit) -> String {
         let limited = TunedBounds::quantity_of(&self.bound);
         let value = in_unit(&self.bound, self.value, angles);
         let is_lower = TunedBounds::place_of(&self.bound).is_some_and(|place| TunedBounds::IS_LOWER[place]);
@@ -205,7 +205,7 @@ impl BoundValue {
 
 impl Explanation {
     /// The first conflict in one sentence, without details of the search; `None` if no conflict is known.
-    pub fn headline(&self, angles: AngleUnit) -> Option<String> {
+    pub fn headline(&self, angles: DisplayAngleUnit) -> Option<String> {
         if self.gait_found {
             return Some("The bounds of this trial do not conflict: the solve missed a gait.".to_owned());
         }
@@ -229,7 +229,7 @@ impl Explanation {
     }
 
     /// The conflicts as sentences, the first one first. If they are unknown, the largest violation.
-    pub fn conflicts_in_words(&self, angles: AngleUnit) -> Vec<String> {
+    pub fn conflicts_in_words(&self, angles: DisplayAngleUnit) -> Vec<String> {
         if self.gait_found {
             let found = "The search for a conflict found a gait with exactly these bounds. They do not conflict; the solve missed \
                          this gait.";
@@ -242,7 +242,7 @@ impl Explanation {
     }
 
     /// The largest violation, as a sentence; `None` if there is none.
-    fn missed_most(&self, angles: AngleUnit) -> Option<String> {
+    fn missed_most(&self, angles: DisplayAngleUnit) -> Option<String> {
         let worst = self.violations.first()?;
         Some(format!("Largest violation: {}, by {}.", worst.row, worst.amount_in(angles)))
     }
@@ -253,7 +253,7 @@ impl Explanation {
     }
 
     /// The relaxations as sentences: single ones, joint ones, and those that are not sufficient.
-    pub fn remedies_in_words(&self, angles: AngleUnit) -> Vec<String> {
+    pub fn remedies_in_words(&self, angles: DisplayAngleUnit) -> Vec<String> {
         let helps = |joint: &&JointRelaxation| joint.bounds.iter().all(|one| one.to.is_some());
         let alone = self.relaxations.iter().map(|one| one.in_words(angles));
         let together = self.together.iter().filter(helps).map(|one| one.in_words(angles));
@@ -270,7 +270,7 @@ impl Explanation {
 
     /// The explanation as sentences, with angles in radians.
     pub fn sentences(&self) -> Vec<String> {
-        let angles = AngleUnit::Radian;
+        let angles = DisplayAngleUnit::Radian;
         let status = status_in_words(self.status).map(str::to_owned);
         let at_limit = self.at_limit.iter().map(|at| at.in_words(angles));
         let conflicts = self.conflicts_in_words(angles).into_iter();

@@ -27,7 +27,7 @@ const FIELDS: [(&str, &str); 29] = [
     ("device", "name of the prosthesis"),
     (
         "certificate_passed",
-        "whether the gait passed its certificate; false means that an independent check found a limit exceeded",
+        "whether the certificate of the gait passed; false means that at least one independent check exceeded its limit",
     ),
     ("stride_time_s", "time from right heel strike to the next, s"),
     ("stride_length_m", "distance between right heel strikes, m"),

@@ -46,8 +46,9 @@ fn torso(degrees: &[f64]) -> Option<String> {
 fn knee(degrees: &[f64]) -> Option<String> {
     let (least, peak) = extremes(degrees);
     if peak < SMALLEST_KNEE_PEAK_DEG {
-        let reason =
-            format!("bends to at most {peak:.1}° in the stride; at least {SMALLEST_KNEE_PEAK_DEG}° is plausible");
+        let reason = format!(
+            "has a peak flexion of only {peak:.1}° in the stride; at least {SMALLEST_KNEE_PEAK_DEG}° is expected"
+        );
         return Some(format!("{reason}; check the sign and the unit"));
     }
     (least > LARGEST_LEAST_FLEXION_DEG).then(|| {

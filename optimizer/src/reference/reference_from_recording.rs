@@ -60,7 +60,8 @@ impl MotionRecording {
         let strikes = self.heel_strikes(how)?;
         let strides = self.strides(&strikes).into_iter().filter(|stride| stride.is_used);
         let strides: Vec<(f64, f64)> = strides.map(|stride| (stride.start_s, stride.end_s)).collect();
-        let kept = format!("{} to {} s, without gaps above {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+        let kept =
+            format!("{} to {} s, without gaps longer than {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
             let (shortest, longest) = STRIDE_RANGE_S;
             let reason =

@@ -1,21 +1,21 @@
 //! Sensitivities as sentences.
 
 use super::{BoundSensitivity, GaitSensitivities};
-use crate::angle_unit::AngleUnit;
+use crate::display_angle_unit::DisplayAngleUnit;
 use crate::number_format::figure;
 use crate::tuned_bounds::TunedBounds;
 
 /// A change of a bound that a person would make, in words and in units of the bound.
-fn change_of(bound: usize, angles: AngleUnit) -> (&'static str, f64) {
+fn change_of(bound: usize, angles: DisplayAngleUnit) -> (&'static str, f64) {
     match (TunedBounds::UNITS[bound], angles) {
-        ("rad/s", AngleUnit::Radian) => ("1 rad/s", 1.0),
-        ("rad/s", AngleUnit::Degree) => ("10 °/s", 10_f64.to_radians()),
-        ("rad/s²", AngleUnit::Radian) => ("1 rad/s²", 1.0),
-        ("rad/s²", AngleUnit::Degree) => ("10 °/s²", 10_f64.to_radians()),
+        ("rad/s", DisplayAngleUnit::Radian) => ("1 rad/s", 1.0),
+        ("rad/s", DisplayAngleUnit::Degree) => ("10 °/s", 10_f64.to_radians()),
+        ("rad/s²", DisplayAngleUnit::Radian) => ("1 rad/s²", 1.0),
+        ("rad/s²", DisplayAngleUnit::Degree) => ("10 °/s²", 10_f64.to_radians()),
         ("m/s", _) => ("0.01 m/s", 0.01),
         ("m", _) => ("1 mm", 0.001),
-        ("rad", AngleUnit::Radian) => ("0.01 rad", 0.01),
-        ("rad", AngleUnit::Degree) => ("1°", 1_f64.to_radians()),
+        ("rad", DisplayAngleUnit::Radian) => ("0.01 rad", 0.01),
+        ("rad", DisplayAngleUnit::Degree) => ("1°", 1_f64.to_radians()),
         _ => ("1°", 1.0),
     }
 }
@@ -26,7 +26,7 @@ const ANY_VALUE: &str = "any value";
 
 impl GaitSensitivities {
     /// One sentence for each bound that matters, and one for the others.
-    pub fn sentences(&self, angles: AngleUnit) -> Vec<String> {
+    pub fn sentences(&self, angles: DisplayAngleUnit) -> Vec<String> {
         let matters = |bound: &&BoundSensitivity| !bound.active.is_empty();
         let mut sentences: Vec<String> =
             self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport, angles)).collect();
@@ -55,7 +55,7 @@ impl BoundSensitivity {
         }
     }
 
-    fn sentence(&self, cost_of_transport: f64, angles: AngleUnit) -> String {
+    fn sentence(&self, cost_of_transport: f64, angles: DisplayAngleUnit) -> String {
         let place = TunedBounds::NAMES.iter().position(|name| *name == self.bound).unwrap_or(0);
         let (change, by) = change_of(place, angles);
         // A lower bound is stricter the larger it is.
@@ -120,10 +120,10 @@ mod tests {
             // Beyond the range of the bound there is no limit.
             ((Some(-1.0), Some(100.0)), "for any value."),
         ] {
-            let sentence = of(interval).sentence(1.0, AngleUnit::Radian);
+            let sentence = of(interval).sentence(1.0, DisplayAngleUnit::Radian);
             assert!(sentence.ends_with(&format!("The same constraints stay active {values}")), "{sentence}");
         }
-        let in_degrees = of((Some(0.25), None)).sentence(1.0, AngleUnit::Degree);
+        let in_degrees = of((Some(0.25), None)).sentence(1.0, DisplayAngleUnit::Degree);
         assert!(
             in_degrees.starts_with("a6 (torso lean): 1° less") && in_degrees.ends_with("14.3 or more."),
             "{in_degrees}"

@@ -2,10 +2,10 @@
 
 use crate::format;
 use gait_optimizer::number_format::with_unit;
-use gait_optimizer::{AngleUnit, TunedBounds};
+use gait_optimizer::{DisplayAngleUnit, TunedBounds};
 
 /// The unit of angles on pages and charts.
-pub(crate) const ANGLES: AngleUnit = AngleUnit::Degree;
+pub(crate) const ANGLES: DisplayAngleUnit = DisplayAngleUnit::Degree;
 
 /// The unit in which a bound is shown; empty for any other name.
 pub(crate) fn unit(name: &str) -> &'static str {

@@ -37,7 +37,7 @@ const LABELS: &[(&str, &str)] = &[
     ("band_high_hz", "Band-pass to, Hz"),
     ("envelope_hz", "Low-pass cut-off, Hz"),
     ("order", "Filter order"),
-    ("simulated_walks", "Number of simulated walks on each ground"),
+    ("simulated_walks", "Number of simulated walks on each kind of ground"),
     ("seed", "Seed"),
     ("number_of_trials", "Number of trials"),
     ("form", "Signed consent form"),

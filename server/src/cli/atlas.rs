@@ -16,7 +16,7 @@ use clap::Args;
 use gait_optimizer::TunedBounds;
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::atlas::{self, BestGaitSearch};
+use gaitwright_service::studies::atlas::{self, BestCertifiedGaitSearch};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
@@ -79,7 +79,7 @@ impl AtlasCommand {
                     found.map(|found| (finished, found))
                 });
                 let (finished, found) = search.await??;
-                if matches!(found, BestGaitSearch::Cancelled) {
+                if matches!(found, BestCertifiedGaitSearch::Cancelled) {
                     tell("stopped; run the same command again to continue");
                     return Ok(CommandEnd::Interrupted);
                 }
@@ -94,16 +94,16 @@ impl AtlasCommand {
     }
 }
 
-fn write_best(found: BestGaitSearch, file: OutFile) -> Result<(), Error> {
-    let BestGaitSearch::Found { best, failed } = found else {
-        return Err(Error::Malformed("No gait of the atlas passes its certificate.".to_owned()));
+fn write_best(found: BestCertifiedGaitSearch, file: OutFile) -> Result<(), Error> {
+    let BestCertifiedGaitSearch::Found { best, failed } = found else {
+        return Err(Error::Malformed("No gait of the atlas passed certification.".to_owned()));
     };
     let path = file.path().display().to_string();
     file.write(&solve_file::text(&best.outcome, &Lineage::of(&best.outcome, None))?)?;
     let (number, rmse) = (best.number, best.outcome.report.gait_rmse_rad);
     tell(&format!("best certified gait: gait {number}, Gait RMSE {rmse:.4} rad; written to {path}"));
     if failed > 0 {
-        tell(&format!("gaits with a lower Gait RMSE that failed their certificates: {failed}"));
+        tell(&format!("gaits with a lower Gait RMSE that failed certification: {failed}"));
     }
     tell(&certify::for_people(&best.certificate));
     Ok(())

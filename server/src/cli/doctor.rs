@@ -1,4 +1,4 @@
-//! `gaitwright doctor`: checks the machine, the settings and the record, for bug reports.
+//! `gaitwright doctor`: checks the machine, the settings, what `serve` needs, the record, the clock and the broker.
 
 use super::output::data;
 use super::service_plan::ServicePlan;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-/// How far another machine's clock may be ahead without notice, s.
+/// How far the record may be ahead of the clock without notice, s: the clocks of machines that write to it differ.
 const CLOCKS_DIFFER_S: i64 = 5;
 
 #[derive(Debug, Args)]

@@ -42,7 +42,7 @@ pub(super) fn check_stated_values(gait: &Gait, report: &SolveReport, reference: 
             reference.name
         )),
         Some((name, computed, stated)) => {
-            Err(format!("the file says that {name} is {stated}; computed from the gait it is {computed}."))
+            Err(format!("the file says that {name} is {stated}; the value computed from the gait is {computed}."))
         }
     }
 }

@@ -104,7 +104,8 @@ enum Command {
     Audit(audit::AuditCommand),
     /// Show the settings of the service.
     Config(config::ConfigCommand),
-    /// Check the machine, the settings and the record. Exits with status 1 if anything is wrong.
+    /// Check the machine, the settings, the address and folders of the service, the record, the clock and the broker. Exits with
+    /// status 1 if anything is wrong.
     ///
     /// The output is meant for bug reports: it contains no subject data and no secrets.
     Doctor(doctor::DoctorCommand),

@@ -12,17 +12,17 @@ fn walks(text: &str) -> Result<u32, String> {
 
 #[derive(Debug, Clone, Args)]
 pub(super) struct SimulatedWalksFlags {
-    /// What simulated walks with each gait do (default: none).
+    /// Effect of simulated walks with each gait on the study (default: none).
     #[arg(long, value_name = "EFFECT", value_parser = one_of::<SimulatedWalksEffect>(SIMULATED_WALKS))]
     simulated_walks: Option<SimulatedWalksEffect>,
     /// Number of simulated walks with each gait on each of the three kinds of ground (default: 50).
     #[arg(long, value_name = "NUMBER", value_parser = walks, allow_negative_numbers = true, requires = "simulated_walks")]
     walks: Option<u32>,
-    /// For `tie_break`: gaits whose Gait RMSE differs by less than this, rad, are compared by their mean strides
+    /// For `tie_break`: difference in Gait RMSE, rad, below which two gaits are compared by their mean strides
     /// (default: 0.05).
     #[arg(long, value_name = "RAD", value_parser = number, allow_negative_numbers = true, requires = "simulated_walks")]
     gait_rmse_tolerance: Option<f64>,
-    /// For `label`: the least mean number of strides of an executable gait (default: 3).
+    /// For `label`: minimum mean strides of an executable gait (default: 3).
     #[arg(long, value_name = "STRIDES", value_parser = number, allow_negative_numbers = true, requires = "simulated_walks")]
     least_mean_strides: Option<f64>,
 }

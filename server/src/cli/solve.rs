@@ -18,8 +18,8 @@ use gait_optimizer::explanation::{self, Explanation};
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};
 use gait_optimizer::sensitivity::{GaitSensitivities, sensitivities};
 use gait_optimizer::{
-    AngleUnit, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom, TunedBounds,
-    solve,
+    DisplayAngleUnit, GaitProblem, SolveError, SolveOptions, SolveOutcome, SolveReport, SolveStatus, StartedFrom,
+    TunedBounds, solve,
 };
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
@@ -184,7 +184,7 @@ impl SolveCommand {
                 data(&super::certify::for_people(certificate))?;
             }
             if let Some(sensitivities) = &sensitivities {
-                data(&sensitivities.sentences(AngleUnit::Radian).join("\n"))?;
+                data(&sensitivities.sentences(DisplayAngleUnit::Radian).join("\n"))?;
             }
         }
         if outcome.report.status == SolveStatus::Cancelled {

@@ -22,7 +22,7 @@ pub struct ExecutionReported {
     pub trial_id: TrialId,
     /// Its number.
     pub number: u32,
-    /// Number of simulated walks on each ground.
+    /// Number of simulated walks on each kind of ground.
     pub simulated_walks: u32,
     /// Seed of the disturbances.
     pub seed: u64,

@@ -2,7 +2,7 @@
 
 use super::super::RelaxedBound;
 use super::*;
-use AngleUnit::{Degree, Radian};
+use DisplayAngleUnit::{Degree, Radian};
 
 fn named(bound: usize) -> (String, String) {
     (TunedBounds::NAMES[bound].to_owned(), TunedBounds::MEANINGS[bound].to_owned())

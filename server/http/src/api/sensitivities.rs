@@ -7,7 +7,7 @@ use crate::resources::sensitivities::{ActiveConstraint, ResultDerivatives};
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
-use gait_optimizer::AngleUnit;
+use gait_optimizer::DisplayAngleUnit;
 use gait_optimizer::sensitivity::BoundSensitivity;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
@@ -106,7 +106,7 @@ pub(super) async fn get(
     drop(reader);
     let computed = app.compute(move |pool| solution.sensitivities(pool)).await.map_err(Error::from)?;
     let StudySensitivities { found, steps } = computed?;
-    let (sentences, cost_of_transport) = (found.sentences(AngleUnit::Radian), found.cost_of_transport);
+    let (sentences, cost_of_transport) = (found.sentences(DisplayAngleUnit::Radian), found.cost_of_transport);
     let bounds = found.bounds.into_iter().zip(steps).map(|(bound, step)| SensitivityToBound::new(bound, step));
     Ok(Json(TrialSensitivities { trial_id: id, sentences, cost_of_transport, bounds: bounds.collect() }))
 }

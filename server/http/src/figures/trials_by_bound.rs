@@ -89,7 +89,7 @@ pub(crate) fn parallel(snapshot: &StudySnapshot, analysis: &Analysis) -> Result<
     let lines = drawn(snapshot, analysis)?.into_iter().map(line).collect::<Result<Vec<_>, LearnerError>>()?;
     Ok((!lines.is_empty()).then(|| {
         Figure::parallel(Parallel {
-            title: "Bounds and outcome of each trial".to_owned(),
+            title: "Bounds and result of each trial".to_owned(),
             axes: axes.collect(),
             outcome: shown.label().to_owned(),
             low_is_good: shown == TrialMeasure::GaitRmse,

@@ -1,296 +1,164 @@
-//! The page of a lab session with its walks and measurements.
+//! The page of all lab sessions of a study, with the form that plans one.
 
-use super::measurement_forms::{FilterFields, Forms};
-use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
-use crate::figures::lab_charts;
-use crate::figures::lab_session::measured_cycles;
 use crate::format::{self, words};
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::RefusedFields;
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gait_optimizer::emg::{CycleActivity, EmgSettings};
-use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
+use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{
-    self, EmgView, LabSessionState, LabSessionView, MeasurementFormat, WalkActivity, WalkCondition, WalkView,
-};
-use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
-use gaitwright_store::studies::Study;
-use gaitwright_store::{LabSessionId, TrialId, commit, lab_sessions, studies, trials};
+use gaitwright_service::studies::lab::{self, GaitsToPlanWith, LabSessionView, NewLabSession};
+use gaitwright_service::studies::recommended_trial::ranking_to_show;
+use gaitwright_service::studies::snapshot::StudySnapshot;
+use gaitwright_store::studies::{AnswerSource, Study};
+use gaitwright_store::trial_list::ListedTrial;
+use gaitwright_store::{LabSessionId, StudyId, TrialId, commit, lab_sessions, studies};
 use serde::Deserialize;
+use std::sync::Arc;
+
+/// How many converged trials the form considers, lowest Gait RMSE first.
+const OFFERED: u32 = 200;
+/// How many gaits without a certificate are named.
+const NAMED: usize = 3;
 
 #[derive(Template)]
-#[template(path = "lab_session.html")]
-struct SessionPage {
+#[template(path = "lab_sessions.html")]
+struct SessionsPage {
     study: Study,
-    name_in_lab: String,
-    state: String,
-    gaits: [NumberedTrial; 2],
-    walks: Vec<WalkRow>,
+    /// The sessions, with name in the lab and state.
+    sessions: Vec<(LabSessionView, String, String)>,
+    /// Different walkable gaits of the study, best first, with their labels.
+    gaits: Vec<(TrialId, String)>,
+    /// The best gaits that lack nothing but a certificate, with their labels.
+    without_certificate: Vec<(TrialId, String)>,
     may_run: bool,
-    may_unblind: bool,
-    /// Recorded walks, for which files can be uploaded.
-    recorded: Vec<UploadWalk>,
-    recordings: Vec<MeasurementFile>,
-    has_emg: bool,
-    forms: Forms,
-    filters: FilterFields,
-    measured: Option<MeasuredActivity>,
-    limit_cycles: Vec<PageChart>,
+    fields: LabSessionFields,
     refused: RefusedFields,
-    /// The answer of the subject, in words.
-    answer_in_words: &'static str,
-    session: LabSessionView,
 }
 
-/// A recorded walk, and which kinds of files it has.
-struct UploadWalk {
-    number: u8,
-    has_emg: bool,
-    has_joint_angles: bool,
-}
-
-impl UploadWalk {
-    fn all(session: &LabSessionView, files: &[MeasurementFile]) -> Vec<Self> {
-        let recorded = session.walks.iter().filter(|walk| walk.recorded.is_some());
-        let of_walk = |walk: &WalkView| {
-            let has = |kind| files.iter().any(|file| file.walk == walk.number && file.kind == kind);
-            let (has_emg, has_joint_angles) = (has(MeasurementKind::Emg), has(MeasurementKind::JointAngles));
-            Self { number: walk.number, has_emg, has_joint_angles }
-        };
-        recorded.map(of_walk).collect()
+impl SessionsPage {
+    fn is(chosen: &str, gait: &TrialId) -> bool {
+        chosen == gait.to_string()
     }
 }
 
-/// The results of the EMG recordings.
-struct MeasuredActivity {
-    how: String,
-    walks: Vec<String>,
-    /// The walks that are compared with the walk without the device.
-    compared: Vec<String>,
-    /// Muscle, its EMG RMSE in the walks that are compared, its average activity in each walk.
-    rows: Vec<(String, Vec<String>, Vec<String>)>,
-    /// Walk, measured muscle, muscle of the model, RMS difference, correlation.
-    model: Vec<[String; 5]>,
-    /// Why a comparison is uncertain, with the walk.
-    warnings: Vec<String>,
-    charts: Vec<PageChart>,
-    /// The legend that the charts share.
-    legend: Vec<(String, String)>,
+/// The fields as typed, to show a refused form again.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LabSessionFields {
+    trial_a: String,
+    trial_b: String,
+    notes: String,
 }
 
-impl MeasuredActivity {
-    fn of(session: &LabSessionView, emg: &EmgView, mut charts: Vec<PageChart>) -> Self {
-        let legend = shared_legend(&mut charts);
-        let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
-        let strides = |walk: &WalkActivity| {
-            let strides = match walk.channels.first().map_or(0, |channel| channel.strides) {
-                1 => "1 stride".to_owned(),
-                many => format!("{many} strides"),
-            };
-            format!("{strides} ({})", lab_charts::walk_name(session, walk.walk))
-        };
-        let counts: Vec<String> = emg.result.walks.iter().map(strides).collect();
-        let walks = || emg.result.walks.iter();
-        let name = |walk: &WalkActivity| lab_charts::walk_name(session, walk.walk);
-        let compared: Vec<_> = walks().filter_map(|walk| Some((walk, walk.emg_rmse.as_ref()?))).collect();
-        let channels = emg.result.walks.first().map_or(&[][..], |walk| &walk.channels);
-        let row = |(place, channel): (usize, &CycleActivity)| {
-            let rmse = compared.iter().map(|(_, rmse)| format::decimal(rmse.parts.get(place).copied()));
-            let averages = walks().map(|walk| format::decimal(walk.averages.get(place).copied()));
-            (lab_charts::muscle_name(&channel.channel).to_owned(), rmse.collect(), averages.collect())
-        };
-        let mut rows: Vec<(String, Vec<String>, Vec<String>)> = channels.iter().enumerate().map(row).collect();
-        let totals = compared.iter().map(|(_, rmse)| format::decimal(Some(rmse.total))).collect();
-        rows.push(("sum of all muscles".to_owned(), totals, walks().map(|_| String::new()).collect()));
-        let model = emg.model.iter().flat_map(|walk| {
-            walk.muscles.iter().map(|muscle| {
-                [
-                    lab_charts::walk_name(session, walk.walk),
-                    lab_charts::muscle_name(&muscle.channel).to_owned(),
-                    muscle.muscle.clone(),
-                    format::decimal(Some(muscle.rms_difference)),
-                    muscle.correlation.map_or_else(|| "–".to_owned(), format::signed),
-                ]
-            })
-        });
-        Self {
-            how: format!(
-                "Band-pass {band_low_hz} to {band_high_hz} Hz, rectified, low-pass {envelope_hz} Hz, order {order}, all \
-                 zero-phase. Means of {}. Values are relative to the muscle's peak without the device.",
-                counts.join(", ")
-            ),
-            compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
-            warnings: compared
-                .iter()
-                .flat_map(|(walk, rmse)| rmse.warnings.iter().map(|warning| format!("{}: {warning}", name(walk))))
-                .collect(),
-            walks: walks().map(name).collect(),
-            rows,
-            model: model.collect(),
-            charts,
-            legend,
-        }
+impl LabSessionFields {
+    fn read(&self) -> Result<NewLabSession, Error> {
+        let gait = |field, text: &str| text.parse().map_err(|_| Error::invalid(field, text, "a gait from the list"));
+        Ok(NewLabSession {
+            trial_a: gait("trial_a", &self.trial_a)?,
+            trial_b: gait("trial_b", &self.trial_b)?,
+            notes: self.notes.clone(),
+        })
     }
 }
 
-/// A trial and its number.
-struct NumberedTrial {
-    id: TrialId,
-    number: u32,
+impl TypedForm for LabSessionFields {
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(&[("trial_a", "Gait A"), ("trial_b", "Gait B"), ("notes", "Notes")])
+    }
+
+    /// Only the list has acceptable gaits.
+    fn repair(&mut self, _: &str) -> bool {
+        false
+    }
 }
 
-struct WalkRow {
-    walk: WalkView,
-    /// The condition, as far as it is not blinded.
-    condition: &'static str,
-}
-
-/// `GET /lab-sessions/{id}`.
-pub(super) async fn get(
+/// `GET /studies/{id}/lab`.
+pub(super) async fn list(
     authorized: Authorized<Read>,
     State(mut app): State<AppState>,
-    Visible(id, _): Visible<LabSessionId, Read>,
+    Visible(id, _): Visible<StudyId, Read>,
 ) -> PageResult {
-    show(&mut app, id, &authorized.caller, Forms::default(), RefusedFields::default()).await
+    let may_run = authorized.caller.may(Run::NEEDED);
+    show(&mut app, id, may_run, LabSessionFields::default(), RefusedFields::default()).await
 }
 
-/// The charts of a session.
-struct Drawings {
-    emg: Vec<PageChart>,
-    limit_cycles: Vec<PageChart>,
-}
-
-pub(super) async fn show(
+async fn show(
     app: &mut AppState,
-    id: LabSessionId,
-    caller: &Caller,
-    mut forms: Forms,
+    id: StudyId,
+    may_run: bool,
+    fields: LabSessionFields,
     refused: RefusedFields,
 ) -> PageResult {
-    let emg = lab::emg(app.store_mut(), id).await?;
-    let cycles = measured_cycles(app.store_mut(), id).await?;
     let mut reader = app.read().await?;
-    let session = LabSessionView::from(&lab_sessions::get(&mut reader, id).await?);
-    let study = studies::get(&mut reader, session.study_id).await?;
-    let one = trials::get(&mut reader, session.trial_a).await?.number;
-    let two = trials::get(&mut reader, session.trial_b).await?.number;
-    let recordings = measurement_files::of_session(&mut reader, id).await?;
+    let study = studies::get(&mut reader, id).await?;
+    let sessions = lab_sessions::of_study(&mut reader, id).await?;
+    let GaitsToPlanWith { mut walkable, mut without_certificate } =
+        lab::gaits_to_plan_with(&mut reader, id, OFFERED).await?;
+    let snapshot = StudySnapshot::read(&mut reader, study.clone()).await?;
     drop(reader);
-    let draw = move |_: &OnPool| {
-        let files = format!("/api/v1/lab-sessions/{id}/figures");
-        let drawn = |figures: &[Figure]| figures.iter().map(|figure| PageChart::of(figure, &files, "")).collect();
-        let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::emg(&session, emg)));
-        let drawings = Drawings { emg: of_emg, limit_cycles: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
-        (session, emg, drawings)
+    let analyses = Arc::clone(&app.analyses);
+    let ranked = app.compute(move |pool: &OnPool| ranking_to_show(pool, &snapshot, &analyses)).await;
+    let ranked = ranked.map_err(Error::from)?.map_err(Error::Learner)?;
+    let place = |trial: &ListedTrial| ranked.iter().position(|ranked| *ranked == trial.id).unwrap_or(usize::MAX);
+    walkable.sort_by_key(place);
+    without_certificate.sort_by_key(place);
+    without_certificate.truncate(NAMED);
+    let best = ranked.first().copied();
+    let named = |trial: ListedTrial| (trial.id, label(&trial, best, study.plan.answer_source));
+    let shown = |session| {
+        let view = LabSessionView::from(&session);
+        let (name_in_lab, state) = (lab::name_in_lab(view.id), words(view.state.as_str()));
+        (view, name_in_lab, state)
     };
-    let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
-    let recorded = UploadWalk::all(&session, &recordings);
-    // The form offers the next walk without a file: the newest file of a walk replaces earlier ones.
-    let next = |has: fn(&UploadWalk) -> bool| recorded.iter().find(|walk| !has(walk)).map_or(0, |walk| walk.number);
-    if forms.open != "emg" {
-        forms.emg.walk = next(|walk| walk.has_emg);
-    }
-    if forms.open != "joint_angles" {
-        forms.joint_angles.walk = next(|walk| walk.has_joint_angles);
-    }
-    page(&SessionPage {
+    page(&SessionsPage {
+        sessions: sessions.into_iter().map(shown).collect(),
+        gaits: walkable.into_iter().map(named).collect(),
+        without_certificate: without_certificate.into_iter().map(named).collect(),
         study,
-        name_in_lab: lab::name_in_lab(session.id),
-        state: words(session.state.as_str()),
-        gaits: [NumberedTrial { id: session.trial_a, number: one }, NumberedTrial { id: session.trial_b, number: two }],
-        walks: session
-            .walks
-            .iter()
-            .map(|walk| WalkRow { walk: walk.clone(), condition: in_words(walk.condition) })
-            .collect(),
-        may_run: caller.may(Run::NEEDED),
-        may_unblind: caller.may(Administer::NEEDED),
-        recorded,
-        has_emg: recordings.iter().any(|recording| recording.kind == MeasurementKind::Emg),
-        recordings,
-        filters: forms
-            .filters
-            .take()
-            .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
-        forms,
-        measured: emg.as_ref().map(|emg| MeasuredActivity::of(&session, emg, drawings.emg)),
-        limit_cycles: drawings.limit_cycles,
+        may_run,
+        fields,
         refused,
-        answer_in_words: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),
-        session,
     })
 }
 
-fn in_words(condition: Option<WalkCondition>) -> &'static str {
-    match condition {
-        None => "one of the two gaits (blinded)",
-        Some(WalkCondition::Normal) => "without the device",
-        Some(WalkCondition::GaitA) => "gait A",
-        Some(WalkCondition::GaitB) => "gait B",
-    }
+/// `trial 3 (recommended)`. Where people decide, Gait RMSE does not rank gaits.
+fn label(trial: &ListedTrial, best: Option<TrialId>, answers: AnswerSource) -> String {
+    let recommended = (best == Some(trial.id)).then(|| "recommended".to_owned());
+    let rmse = || format!("Gait RMSE {} rad", format::decimal(trial.gait_rmse_rad));
+    let rmse = (answers == AnswerSource::GaitRmse).then(rmse);
+    let facts: Vec<String> = recommended.into_iter().chain(rmse).collect();
+    let number = trial.number;
+    if facts.is_empty() { format!("trial {number}") } else { format!("trial {number} ({})", facts.join(", ")) }
 }
 
-/// The form with a note or a reason.
-#[derive(Debug, Deserialize)]
-pub(super) struct Note {
-    #[serde(default)]
-    note: String,
-}
-
-/// `POST /lab-sessions/{id}/close`.
-pub(super) async fn close(
+/// `POST /studies/{id}/lab`.
+pub(super) async fn plan(
     authorized: Authorized<Run>,
     State(mut app): State<AppState>,
-    Id(id, _): Id<LabSessionId, Run>,
-    Form(Note { note }): Form<Note>,
+    Id(id, _): Id<StudyId, Run>,
+    Form(fields): Form<LabSessionFields>,
 ) -> Result<Response, PageError> {
-    let done = async {
+    let planned = async {
+        let new = fields.read()?;
         let mut writer = app.write().await?;
-        lab::close(&mut writer, &authorized.caller.actor, id, &note).await?;
-        Ok(commit(writer).await?)
+        let session = lab::plan(&mut writer, &authorized.caller.actor, id, &new).await?;
+        commit(writer).await?;
+        Ok::<LabSessionId, Error>(session.id)
     };
-    let refused = done.await.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))?;
-    answer(&mut app, id, &authorized.caller, refused, Forms::default()).await
-}
-
-/// `POST /lab-sessions/{id}/unblind`.
-pub(super) async fn unblind(
-    authorized: Authorized<Administer>,
-    State(mut app): State<AppState>,
-    Id(id, _): Id<LabSessionId, Administer>,
-    Form(Note { note }): Form<Note>,
-) -> Result<Response, PageError> {
-    let done = async {
-        let mut writer = app.write().await?;
-        lab::unblind(&mut writer, &authorized.caller.actor, id, &note).await?;
-        Ok(commit(writer).await?)
+    let error = match planned.await {
+        Ok(session) => return Ok(Redirect::to(&format!("/lab-sessions/{session}")).into_response()),
+        Err(error) => error,
     };
-    let refused = done.await.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))?;
-    // The learner may have a new preference.
-    app.scheduler.changed();
-    answer(&mut app, id, &authorized.caller, refused, Forms::default()).await
-}
-
-/// Shows the session again after a change, with the reasons if it was refused.
-pub(super) async fn answer(
-    app: &mut AppState,
-    id: LabSessionId,
-    caller: &Caller,
-    refused: RefusedFields,
-    forms: Forms,
-) -> Result<Response, PageError> {
-    if refused.is_empty() {
-        return Ok(Redirect::to(&format!("/lab-sessions/{id}")).into_response());
-    }
-    Ok((refused.status(), show(app, id, caller, forms, refused).await?).into_response())
+    let mut check = FormCheck::new(&fields);
+    check.refuse(error)?;
+    let refused = check.into_refused();
+    Ok((refused.status(), show(&mut app, id, true, fields, refused).await?).into_response())
 }

@@ -1,6 +1,6 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
-use super::lab_sessions;
+use super::lab_session;
 use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields, PreviewedEmg};
 use super::recording_preview::RecordingPreview;
 use crate::AppState;
@@ -85,9 +85,9 @@ async fn answer(
 ) -> Result<Response, PageError> {
     if forms.preview.is_some() || forms.joint_angle_preview.is_some() {
         let status = refused.status();
-        return Ok((status, lab_sessions::show(app, id, &authorized.caller, forms, refused).await?).into_response());
+        return Ok((status, lab_session::show(app, id, &authorized.caller, forms, refused).await?).into_response());
     }
-    lab_sessions::answer(app, id, &authorized.caller, refused, forms).await
+    lab_session::answer(app, id, &authorized.caller, refused, forms).await
 }
 
 /// Reads and draws the file of the form on the thread pool. Nothing is stored.
@@ -149,5 +149,5 @@ pub(super) async fn process(
         }
     }
     let forms = Forms { filters: Some(typed), open: "filters", ..Forms::default() };
-    lab_sessions::answer(&mut app, id, &authorized.caller, check.into_refused(), forms).await
+    lab_session::answer(&mut app, id, &authorized.caller, check.into_refused(), forms).await
 }

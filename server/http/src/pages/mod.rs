@@ -19,7 +19,7 @@ mod help;
 mod home;
 mod jobs;
 mod joint_peaks;
-mod lab_plan;
+mod lab_session;
 mod lab_sessions;
 mod lab_tablet;
 mod measurement_files;
@@ -97,10 +97,10 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/rate/{id}", post(rate::next))
         .route("/rate/pair/{code}", get(rate::pair).post(rate::answer))
         .route("/rate/pair/{code}/retract", post(rate::retract))
-        .route("/studies/{id}/lab", get(lab_plan::list).post(lab_plan::plan))
-        .route("/lab-sessions/{id}", get(lab_sessions::get))
-        .route("/lab-sessions/{id}/close", post(lab_sessions::close))
-        .route("/lab-sessions/{id}/unblind", post(lab_sessions::unblind))
+        .route("/studies/{id}/lab", get(lab_sessions::list).post(lab_sessions::plan))
+        .route("/lab-sessions/{id}", get(lab_session::get))
+        .route("/lab-sessions/{id}/close", post(lab_session::close))
+        .route("/lab-sessions/{id}/unblind", post(lab_session::unblind))
         .route("/lab-sessions/{id}/measurement-files/emg", post(measurement_files::emg))
         .route("/lab-sessions/{id}/measurement-files/joint-angles", post(measurement_files::joint_angles))
         .route("/lab-sessions/{id}/process", post(measurement_files::process))

@@ -110,7 +110,7 @@ pub(super) async fn get(
     // The form proposes two different studies: the newest ones besides the chosen one.
     let other_than = |taken: Option<StudyId>| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
     let a = a.or_else(|| other_than(b));
-    let b = b.or_else(|| other_than(a));
+    let b = b.filter(|b| Some(*b) != a).or_else(|| other_than(a));
     Ok((refused.status(), page(&SideBySide { offered, a, b, compared, refused })?).into_response())
 }
 

@@ -81,7 +81,7 @@ pub async fn suggest(
     if snapshot.open() >= plan.parallel_trials as usize {
         return Err(Error::conflict(match snapshot.open() {
             1 => "A trial is open, and its script has not reported the result yet.".to_owned(),
-            open => format!("{open} trials are open, and their scripts have not reported the outcomes yet."),
+            open => format!("{open} trials are open, and their scripts have not reported the results yet."),
         }));
     }
     let choose = move |pool: &OnPool| {

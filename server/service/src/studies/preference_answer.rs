@@ -164,7 +164,9 @@ pub async fn retract(
     }
     consents::may_be_shown(writer, row.study_id).await?;
     if matches!(row.content, FeedbackContent::Label { .. }) {
-        return Err(Error::conflict("Only a preference can be retracted. This entry is the label of a solve."));
+        return Err(Error::conflict(
+            "This entry is the label of a trial. Only answers and suggestions can be retracted.",
+        ));
     }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, " and say why the answer is retracted")?;

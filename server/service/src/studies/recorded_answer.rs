@@ -202,7 +202,7 @@ pub(super) async fn replace(
         return Err(refused("an answer of a person about the same two trials"));
     }
     if answer.is_by_rater() {
-        return Err(Error::conflict("An answer of a rater cannot be changed. Give an answer of your own."));
+        return Err(Error::conflict("A rater's answer cannot be changed. Give your own answer."));
     }
     if answer.is_about_safety(writer).await? {
         return Err(Error::conflict("A safety report cannot be changed. Staff will review it and can clear the gait."));

@@ -62,7 +62,7 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
     }
     if !gaits::exists(db, trial.id).await? {
         return Err(Error::conflict(format!(
-            "The solution of trial {number} was deleted to save space, so its sensitivities can no longer be computed."
+            "The trajectory of trial {number} was deleted to save space, so its sensitivities can no longer be computed."
         )));
     }
     let plan = studies::get(db, trial.study_id).await?.plan;

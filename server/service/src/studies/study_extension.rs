@@ -34,7 +34,7 @@ pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &Stud
     study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least.min(MOST_TRIALS), MOST_TRIALS)?;
     if least > MOST_TRIALS {
         return Err(Error::conflict(format!(
-            "The study has {MOST_TRIALS} trials already, which is the largest number."
+            "The study has {MOST_TRIALS} trials already, the largest number allowed."
         )));
     }
     study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, MOST_TRIALS)?;

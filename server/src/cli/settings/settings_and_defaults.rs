@@ -14,7 +14,7 @@ pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("nats_queue", "gaitwright", "name of this service on the broker; its workers must use the same name"),
     ("sign_in", "true", "whether users and programs must sign in; false only on a loopback address"),
     ("idle_minutes", "60", "minutes without a request after which a session ends"),
-    ("session_hours", "12", "hours after which a session ends in any case"),
+    ("session_hours", "12", "hours after which a session ends even if it is in use"),
     ("tls_certificate", "", "PEM file with the certificate chain; enables HTTPS, with tls_key"),
     ("tls_key", "", "PEM file with the private key"),
     ("trusted_proxies", "", "comma-separated addresses and networks of reverse proxies whose headers are trusted"),

@@ -150,7 +150,7 @@ impl TypedForm for NewStudyFields {
             ("parallel_trials", "Parallel trials"),
             ("seed", "Seed"),
             ("simulated_walks.effect", "Simulated walks"),
-            ("simulated_walks.number", "Number of simulated walks on each ground"),
+            ("simulated_walks.number", "Number of simulated walks on each kind of ground"),
             ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
             ("simulated_walks.least_mean_strides", "Least mean number of strides"),
             ("nearest_within_percent", "Objective tolerance, %"),
@@ -237,16 +237,16 @@ pub(super) fn learner(name: &str) -> Option<LearnerSettings> {
 /// What simulated walks can do: effect, label and explanation.
 pub(super) const WALKS_EFFECTS: [(SimulatedWalksEffect, &str, &str); 4] = [
     (SimulatedWalksEffect::None, "Nothing", "walks are simulated only on request, on the page of a gait"),
-    (SimulatedWalksEffect::Report, "Report", "each gait gets an execution report, which changes no trial"),
+    (SimulatedWalksEffect::Report, "Report", "each gait gets an execution report; trials are not affected"),
     (
         SimulatedWalksEffect::TieBreak,
         "Break ties",
-        "of two gaits with nearly the same Gait RMSE, the one that walks more strides is better",
+        "of two gaits with nearly the same Gait RMSE, the one with more mean strides is better",
     ),
     (
         SimulatedWalksEffect::Label,
         "Label gaits",
-        "a gait that walks too few strides is not executable: the learner avoids it, and it is never recommended",
+        "a gait with too few mean strides is not executable: the learner avoids it, and it is never recommended",
     ),
 ];
 

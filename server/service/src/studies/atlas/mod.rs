@@ -1,14 +1,14 @@
 //! An atlas: the gait of every action of Table I, from one root gait. It does not depend on the number of workers, and a killed
 //! process can continue it.
 
-mod best_gait;
+mod best_certified_gait;
 mod family;
 mod gait_map;
 mod gait_values;
 mod progress_file;
 mod solved_action;
 
-pub use best_gait::{BestGait, BestGaitSearch};
+pub use best_certified_gait::{BestCertifiedGait, BestCertifiedGaitSearch};
 pub use gait_map::{AtlasRow, GaitMap};
 pub use gait_values::GaitValues;
 pub use solved_action::SolvedAction;
@@ -73,8 +73,8 @@ impl Finished {
         pool: &OnPool,
         observer: &mut dyn FnMut(u32),
         cancel: &CancelToken,
-    ) -> Result<BestGaitSearch, Error> {
-        best_gait::search(pool, &self.family, &self.map, observer, cancel)
+    ) -> Result<BestCertifiedGaitSearch, Error> {
+        best_certified_gait::search(pool, &self.family, &self.map, observer, cancel)
     }
 
     /// Deletes the progress file, once the atlas was written elsewhere.

@@ -55,7 +55,7 @@ fn address_and_credentials(url: &str) -> Result<(ServerAddr, ConnectOptions), Di
     let decoded = |part: &str| {
         let decoded = percent_decode_str(part).decode_utf8();
         decoded.map(Cow::into_owned).map_err(|_| {
-            DispatchError::Unreachable("User and password of the NATS broker must be valid UTF-8.".to_owned())
+            DispatchError::Unreachable("The user name and password for the NATS broker must be valid UTF-8.".to_owned())
         })
     };
     let options = match (address.username(), address.password()) {

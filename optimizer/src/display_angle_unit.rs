@@ -4,14 +4,14 @@ use crate::number_format::{grouped, three_digits, with_unit};
 
 /// The unit of angles, and of their velocities and accelerations, in a text. Other quantities keep their units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AngleUnit {
+pub enum DisplayAngleUnit {
     /// As in files and on the command line, with every digit.
     Radian,
     /// As on pages and charts, with three digits, or as a whole number.
     Degree,
 }
 
-impl AngleUnit {
+impl DisplayAngleUnit {
     /// The unit in which a value is shown: `°/s` for `rad/s`.
     pub fn of(self, unit: &str) -> &str {
         match (self, unit) {
@@ -41,7 +41,7 @@ impl AngleUnit {
 
 #[cfg(test)]
 mod tests {
-    use super::AngleUnit::{Degree, Radian};
+    use super::DisplayAngleUnit::{Degree, Radian};
 
     #[test]
     fn only_angles_are_shown_in_degrees() {

@@ -10,7 +10,7 @@ use gaitwright_compute::OnPool;
 
 /// A gait with its certificate.
 #[derive(Debug)]
-pub struct BestGait {
+pub struct BestCertifiedGait {
     /// Its number in the atlas.
     pub number: u32,
     /// Its solve, repeated from the root gait.
@@ -21,11 +21,11 @@ pub struct BestGait {
 
 /// How the search for the best gait ended.
 #[derive(Debug)]
-pub enum BestGaitSearch {
+pub enum BestCertifiedGaitSearch {
     /// A gait passed. `failed` gaits with a lower Gait RMSE did not.
     Found {
         /// The gait.
-        best: Box<BestGait>,
+        best: Box<BestCertifiedGait>,
         /// Number of gaits before it that failed their certificates.
         failed: usize,
     },
@@ -42,14 +42,14 @@ pub(super) fn search(
     map: &GaitMap,
     observer: &mut dyn FnMut(u32),
     cancel: &CancelToken,
-) -> Result<BestGaitSearch, Error> {
+) -> Result<BestCertifiedGaitSearch, Error> {
     for (failed, (number, solved)) in by_gait_rmse(map).into_iter().enumerate() {
         observer(number);
         let bounds = map.bounds_of(family.problem.bounds, solved.action)?;
         let problem = GaitProblem { bounds, ..family.problem.clone() };
         let outcome = solve(&problem, Some(&family.root), &family.options, &mut |_| {}, cancel)?;
         if cancel.is_cancelled() {
-            return Ok(BestGaitSearch::Cancelled);
+            return Ok(BestCertifiedGaitSearch::Cancelled);
         }
         if outcome.report.status != SolveStatus::Converged {
             let why = "did not converge again. With a time limit, a result depends on the speed of the machine.";
@@ -57,11 +57,11 @@ pub(super) fn search(
         }
         let certificate = certify(&outcome.gait)?;
         if certificate.passed {
-            let best = Box::new(BestGait { number, outcome, certificate });
-            return Ok(BestGaitSearch::Found { best, failed });
+            let best = Box::new(BestCertifiedGait { number, outcome, certificate });
+            return Ok(BestCertifiedGaitSearch::Found { best, failed });
         }
     }
-    Ok(BestGaitSearch::NoneCertified)
+    Ok(BestCertifiedGaitSearch::NoneCertified)
 }
 
 /// The gaits and their numbers, the lowest Gait RMSE first, then the lowest number.
