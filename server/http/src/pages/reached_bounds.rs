@@ -28,7 +28,7 @@ pub(super) fn of(
 ) -> Result<Vec<BoundUse>, Error> {
     let extremes = gait.map(extremes).transpose()?.unwrap_or_default();
     let values = action.to_array();
-    let limits = gait.map(|gait| gait.settings.limits.clone()).unwrap_or_default();
+    let limits = gait.map(|gait| gait.settings.limits).unwrap_or_default();
     let with_use = |(place, bound): (usize, Bound)| {
         let value = values[place];
         let interval = unchanged.iter().find(|interval| interval.bound == bound.name);
