@@ -12,6 +12,7 @@ use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection};
 use std::path::Path;
 use std::process::Command;
+use std::time::{Duration, SystemTime};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
@@ -74,6 +75,26 @@ async fn doctor_reports_a_clock_that_was_set_back() {
     store.close().await;
     let clock = only_error(doctor(folder.path(), &["--database", "a.db"]));
     assert!(clock.contains("clock") && clock.contains("was set back"), "{clock}");
+}
+
+#[test]
+fn doctor_reports_a_clock_before_the_installation_of_the_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("gaitwright");
+    std::fs::copy(BINARY, &program).unwrap();
+    let ahead = SystemTime::now() + Duration::from_secs(3600);
+    std::fs::File::options().write(true).open(&program).unwrap().set_modified(ahead).unwrap();
+    let report = cli::run(program.to_str().unwrap(), folder.path(), &["doctor", "--listen", "127.0.0.1:0"]);
+    let lines: Vec<String> = String::from_utf8(report.stdout).unwrap().lines().map(str::to_owned).collect();
+    let clock = only_error((report.status.code(), lines));
+    assert!(clock.contains("when this program was installed: the clock is wrong"), "{clock}");
+}
+
+#[test]
+fn doctor_refuses_a_database_without_a_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = only_error(doctor(folder.path(), &["--database", ""]));
+    assert!(record.contains("The database must be the name of a file."), "{record}");
 }
 
 #[tokio::test]

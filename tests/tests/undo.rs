@@ -300,7 +300,11 @@ async fn raters_answer_a_pair_once_and_staff_neither_change_nor_undo_it() {
     assert!(refused.text.contains("Only the rater"), "{}", refused.text);
     let change = json!({"trial_a": a, "trial_b": b, "answer": "a", "author": "K", "replaces": rated.id});
     let refused = service.post(&format!("/api/v1/studies/{study}/preferences"), &change).await;
-    assert!(refused.status == StatusCode::CONFLICT && refused.text.contains("answer of a rater"), "{}", refused.text);
+    assert!(
+        refused.status == StatusCode::CONFLICT && refused.text.contains("A rater's answer cannot be changed"),
+        "{}",
+        refused.text
+    );
     let page = service.fetch(&format!("/studies/{study}/compare?change={}", rated.id)).await.text;
     assert!(!page.contains("Change an answer"), "{page}");
     // The rater cannot change it either, so undo brings nothing back.

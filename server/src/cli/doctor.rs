@@ -8,7 +8,7 @@ use gaitwright_service::error::Error;
 #[cfg(feature = "nats")]
 use gaitwright_service::workers::nats;
 use gaitwright_store::backup_folder::BackupFolder;
-use gaitwright_store::{SCHEMA_VERSION, access_clock, check_path, free_bytes, is_open_elsewhere, now, verify};
+use gaitwright_store::{Instant, SCHEMA_VERSION, access_clock, check_path, free_bytes, is_open_elsewhere, now, verify};
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Ipv6Addr, TcpStream};
 use std::path::{Path, PathBuf};
@@ -63,7 +63,7 @@ impl DoctorCommand {
             ),
         ];
         checks.push(("record", record(&database, settings.anchor().as_deref()).await));
-        checks.push(("clock", if database.is_file() { clock_after(&database).await } else { Good(now().to_string()) }));
+        checks.push(("clock", clock(&database).await));
         checks.push(("broker", broker(settings).await));
         for (what, found) in &checks {
             let (state, text) = match found {
@@ -120,17 +120,34 @@ async fn record(database: &Path, second_anchor: Option<&Path>) -> CheckOutcome {
     }
 }
 
-/// A clock that is behind the record was set back.
-async fn clock_after(database: &Path) -> CheckOutcome {
+/// A clock that is behind the program's own file, or behind the record, was set back or never set.
+async fn clock(database: &Path) -> CheckOutcome {
     let present = now();
+    if let Some(program) = program_written().filter(|&written| behind(present, written)) {
+        return Trouble(format!(
+            "{present} is earlier than {program}, when this program was installed: the clock is wrong"
+        ));
+    }
+    if !database.is_file() {
+        return Good(present.to_string());
+    }
     match access_clock::latest_of_file(database).await {
-        Ok(Some(latest)) if latest > present.plus_seconds(CLOCKS_DIFFER_S) => {
+        Ok(Some(latest)) if behind(present, latest) => {
             Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
         }
         Ok(_) => Good(present.to_string()),
         // The check of the record has the error.
         Err(_) => Good(format!("{present}, not compared with the record")),
     }
+}
+
+fn behind(present: Instant, recorded: Instant) -> bool {
+    recorded > present.plus_seconds(CLOCKS_DIFFER_S)
+}
+
+/// When the file of this program was written, if the system says so.
+fn program_written() -> Option<Instant> {
+    Instant::of_file(std::env::current_exe().ok()?.metadata().ok()?.modified().ok()?)
 }
 
 /// Whether the settings are readable, within their ranges and consistent.

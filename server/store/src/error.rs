@@ -21,6 +21,9 @@ pub enum StoreError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// The name of the file is empty.
+    #[error("The database must be the name of a file.")]
+    NoFileName,
     /// The file is not a database of this program.
     #[error("{} is not a Gaitwright database: {reason}.", path.display())]
     NotADatabase {
@@ -324,6 +327,7 @@ impl StoreError {
         matches!(
             self,
             Self::Open { .. }
+                | Self::NoFileName
                 | Self::NotADatabase { .. }
                 | Self::NewerSchema { .. }
                 | Self::DevelopmentSchema { .. }

@@ -169,8 +169,9 @@ impl Store {
     /// [`Store::open`] with a second anchor, best on another disk.
     ///
     /// # Errors
-    /// [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
-    /// [`StoreError::NewerSchema`], [`StoreError::DevelopmentSchema`], [`StoreError::WrongAnchor`], [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
+    /// [`StoreError::NoFileName`], [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
+    /// [`StoreError::NewerSchema`], [`StoreError::DevelopmentSchema`], [`StoreError::WrongAnchor`],
+    /// [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
     /// if the record contradicts an anchor, [`StoreError::Unsealed`] and [`StoreError::Damaged`] if another program
     /// added, changed or deleted a row or changed the schema; errors of the database.
     pub async fn open_anchored(path: &Path, elsewhere: Option<&Path>) -> StoreResult<Self> {

@@ -32,7 +32,7 @@ pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
 /// Checks a path that may have no record yet, as opening it does, and creates nothing.
 ///
 /// # Errors
-/// [`StoreError::WrongAnchor`], [`StoreError::NoAnchorFolder`], [`StoreError::NotADatabase`] and
+/// [`StoreError::WrongAnchor`], [`StoreError::NoAnchorFolder`], [`StoreError::NoFileName`], [`StoreError::NotADatabase`] and
 /// [`StoreError::RecordMissing`], as [`super::Store::open_anchored`].
 pub fn check_path(path: &Path, second_anchor: Option<&Path>) -> StoreResult<()> {
     anchor::refuse_wrong(second_anchor, path, None)?;

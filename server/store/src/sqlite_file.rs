@@ -34,6 +34,9 @@ pub(super) fn named(path: &Path, error: StoreError) -> StoreError {
 pub(super) fn check(path: &Path) -> StoreResult<()> {
     let cannot_open = |source| StoreError::Open { path: path.to_owned(), source };
     let no_database = |reason: &str| Err(StoreError::NotADatabase { path: path.to_owned(), reason: reason.to_owned() });
+    if path.as_os_str().is_empty() {
+        return Err(StoreError::NoFileName);
+    }
     if path.is_dir() {
         return no_database("it is a folder");
     }

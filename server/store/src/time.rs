@@ -8,7 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant as Steady};
+use std::time::{Duration, Instant as Steady, SystemTime};
 use utoipa::ToSchema;
 
 /// A time in UTC (RFC 3339).
@@ -79,6 +79,11 @@ pub fn set_machine_clock(by_seconds: i64) {
 }
 
 impl Instant {
+    /// The time of a file, if it is within the range of the record.
+    pub fn of_file(time: SystemTime) -> Option<Self> {
+        jiff::Timestamp::try_from(time).ok().map(Self)
+    }
+
     /// Adds seconds, without change on overflow.
     #[must_use]
     pub fn plus_seconds(self, seconds: i64) -> Self {
