@@ -240,7 +240,7 @@ async fn cancelled_explanation_keeps_the_conflict_until_a_complete_one_is_made()
     assert_eq!(part["conflicts"][0]["bounds"][0]["bound"], "a5");
     assert_eq!(service.fetch(&job).await.json()["state"], "cancelled");
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
-    assert!(page.contains("was stopped early") && page.contains("Search again, to the end"), "{page}");
+    assert!(page.contains("was stopped early") && page.contains("Repeat the search in full"), "{page}");
     service.stop().await;
 
     let service = Service::start_explaining(&database, Analytic::default(), Clearance::default()).await;
@@ -248,7 +248,7 @@ async fn cancelled_explanation_keeps_the_conflict_until_a_complete_one_is_made()
     assert_eq!(ask(&service, trial).await.status, StatusCode::ACCEPTED);
     until("it is complete", async || explained(&service, trial).await["stopped_early"] == false).await;
     let page = service.fetch(&format!("/trials/{trial}")).await.text;
-    assert!(!page.contains("was stopped early") && !page.contains("Search again"), "{page}");
+    assert!(!page.contains("was stopped early") && !page.contains("Repeat the search"), "{page}");
     assert_eq!(ask(&service, trial).await.status, StatusCode::OK, "nothing is left to do");
     service.stop().await;
 }

@@ -339,7 +339,10 @@ async fn finished_study_offers_each_pair_of_different_gaits_until_it_is_answered
     };
     assert!(last > 0);
     let (_, page) = offered().await;
-    assert!(page.contains("All pairs of different gaits are answered") && page.contains("Answers so far"), "{page}");
+    assert!(
+        page.contains("All pairs of different gaits have been answered") && page.contains("Answers so far"),
+        "{page}"
+    );
     assert!(!page.contains("class=\"answer\"") && page.contains("compare?change="), "{page}");
     // Another person can still choose two gaits, and a person who undoes is back at them.
     let (a, b) = seen.pop().unwrap();

@@ -262,7 +262,11 @@ async fn import_does_not_change_the_reference_gait_of_new_studies() {
         let checked = service.post_text("/studies/new/check", kind, &body).await.json();
         let shown = text(&checked["reference"]);
         let name = text(&nearest["name"]);
-        let expected = if is_chosen { format!("{name}: nearest to the subject") } else { format!("{name} (distance") };
+        let expected = if is_chosen {
+            format!("The chosen reference gait, {name}, is the nearest")
+        } else {
+            format!("{name} (distance")
+        };
         assert!(shown.contains(&expected), "{expected}: {checked}");
         let is_measured = body.ends_with(text(&near["id"]));
         let chosen = match (is_chosen, is_measured) {

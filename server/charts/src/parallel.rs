@@ -70,7 +70,10 @@ impl Parallel {
     pub fn legend(&self) -> Vec<(String, String)> {
         let mut legend = Vec::new();
         if self.lines.iter().any(|line| line.outcome.is_some()) {
-            legend.push(("key c0 solid".to_owned(), "trial with a gait; fainter lines are worse gaits".to_owned()));
+            legend.push((
+                "key c0 solid".to_owned(),
+                "trial with a gait: the fainter the line, the worse the gait".to_owned(),
+            ));
         }
         if self.lines.iter().any(|line| line.outcome.is_none()) {
             legend.push(("key c1 dashed".to_owned(), "trial without a gait".to_owned()));

@@ -106,9 +106,11 @@ pub(crate) fn simulated_walks(walks: &SimulatedWalks) -> Option<String> {
         SimulatedWalksEffect::None => return None,
         SimulatedWalksEffect::Report => "report".to_owned(),
         SimulatedWalksEffect::TieBreak => format!("break ties of Gait RMSE within {gait_rmse_tolerance_rad} rad"),
-        SimulatedWalksEffect::Label => format!("label gaits with fewer than {least_mean_strides} strides"),
+        SimulatedWalksEffect::Label => {
+            format!("label gaits with fewer than {least_mean_strides} mean strides as not executable")
+        }
     };
-    Some(format!("simulated walks ({number} on each ground): {what}"))
+    Some(format!("simulated walks ({number} on each kind of ground): {what}"))
 }
 
 /// What a study waits for besides its solves; empty if it waits for solves only.

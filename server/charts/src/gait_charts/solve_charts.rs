@@ -49,7 +49,7 @@ fn of_iterations(iterations: &[IterationRecord]) -> Chart {
         iterations.iter().enumerate().map(|(i, r)| (i as f64, f(r))).collect()
     };
     let mut chart =
-        Chart::new("Objective, violation and barrier parameter by iteration", "iteration", "scaled, no unit")
+        Chart::new("Violation, dual infeasibility, barrier parameter and objective", "iteration", "scaled, no unit")
             .with("violation", 0, Stroke::Solid, line(|r| r.constraint_violation))
             .with("dual infeasibility", 1, Stroke::Dashed, line(|r| r.dual_infeasibility))
             .with("barrier parameter", 2, Stroke::Solid, line(|r| r.barrier))

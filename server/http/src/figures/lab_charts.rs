@@ -56,7 +56,7 @@ pub(crate) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
             if walk.walk == 1 {
                 let band = activity.mean.iter().zip(&activity.standard_deviation).enumerate();
                 let band = band.map(|(point, (mean, sd))| (point as f64, mean - sd, mean + sd)).collect();
-                chart = chart.with_band("standard deviation", colour, band);
+                chart = chart.with_band("one standard deviation", colour, band);
             }
             chart = chart.with(&name, colour, stroke, mean);
         }

@@ -46,11 +46,9 @@ impl InWords {
                 "Largest Poincaré multiplier from finite differences (resolution)",
                 format!("{found} ({resolved})"),
             ));
-            let (kept, leak) = (format::number(map.speed_kept), format::number(map.speed_leak));
-            values.push((
-                "Change in speed: share that remains after one stride, share that spreads to other coordinates",
-                format!("{kept}, {leak}"),
-            ));
+            values.push(("Share of a change in speed that remains after one stride", format::number(map.speed_kept)));
+            values
+                .push(("Share of a change in speed that spreads to other coordinates", format::number(map.speed_leak)));
             let distance = format::number(map.fixed_point_distance);
             values.push(("Largest deviation of the gait from the periodic motion, rad or rad/s", distance));
         }

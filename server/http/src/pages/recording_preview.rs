@@ -91,7 +91,7 @@ impl RecordingPreview {
         };
         let charts: Vec<Chart> = preview.traces.iter().map(chart).collect();
         let usage = |place: usize| {
-            if preview.strides[place].is_used { "a stride" } else { "too short, too long, or with a gap" }
+            if preview.strides[place].is_used { "plausible" } else { "too short, too long, or with a gap" }
         };
         let refused = preview.refused.iter().map(form_errors::in_words).collect();
         Self { refused, ..Self::new(&charts, &strides, usage) }

@@ -82,7 +82,9 @@ impl ShownReport {
             ("Largest push at the hip that the walker survives without other disturbances", pushes(&report)),
             (
                 "Disturbed simulated walks",
-                format!("{simulated_walks} on each ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"),
+                format!(
+                    "{simulated_walks} on each kind of ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"
+                ),
             ),
             ("Gait (SHA-256)", report.gait_sha256.clone()),
         ];

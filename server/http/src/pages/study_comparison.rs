@@ -148,7 +148,7 @@ fn answers(snapshot: &StudySnapshot, outcome: &StudyOutcome) -> String {
     match best.map(|trial| preferred(trial, snapshot)) {
         _ if !people_answer(&snapshot.study) => "Gait RMSE answers every comparison".to_owned(),
         None => "no gait is recommended yet".to_owned(),
-        Some(words) if words.is_empty() => "no person has answered a comparison of the recommended gait yet".to_owned(),
+        Some(words) if words.is_empty() => "people have not compared the recommended gait yet".to_owned(),
         Some(words) => words,
     }
 }

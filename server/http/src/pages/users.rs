@@ -33,7 +33,7 @@ const SCOPES: [(Right, &str); 5] = [
     (Right::Rate, "compare gaits blind, and record walks and answers of lab sessions"),
     (
         Right::Device,
-        "fetch the controller files of walks. For the device in the lab; give its token no other scope, or its downloads count as not blind",
+        "fetch the controller files of walks (for the device in the lab). Give its token no other scope, or its downloads count as not blind",
     ),
 ];
 

@@ -59,7 +59,10 @@ fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> Strin
         }
         Some(first) if first.reference_gait.id == chosen.reference_gait.id => {
             let name = &first.reference_gait.name;
-            format!("{name}: nearest to the subject in height and body mass{}.", away(first))
+            format!(
+                "The chosen reference gait, {name}, is the nearest to the subject in height and body mass{}.",
+                away(first)
+            )
         }
         Some(first) => {
             let chosen = chosen.distance.map_or_else(

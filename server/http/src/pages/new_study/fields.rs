@@ -152,7 +152,7 @@ impl TypedForm for NewStudyFields {
             ("simulated_walks.effect", "Simulated walks"),
             ("simulated_walks.number", "Number of simulated walks on each kind of ground"),
             ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
-            ("simulated_walks.least_mean_strides", "Least mean number of strides"),
+            ("simulated_walks.least_mean_strides", "Minimum mean strides"),
             ("nearest_within_percent", "Objective tolerance, %"),
         ]));
         labels

@@ -325,8 +325,8 @@ async fn outlook(db: &mut Connection, plan: &StudyPlan) -> Result<String, Error>
     Ok(match trials::measured(db, plan.muscles).await?.map(took) {
         Some(seconds) => format!("{size} and takes about {}{people}.", format::duration(seconds)),
         None => format!(
-            "{size}. No solve with{} muscles has been timed here yet: the first trial takes up to a minute, later ones a few \
-             seconds{people}.",
+            "{size}. No solve with{} muscles has been timed here yet. The first trial takes up to a minute, and later ones \
+             take a few seconds{people}.",
             if plan.muscles { "" } else { "out" }
         ),
     })

@@ -36,7 +36,7 @@ impl BestFindings {
         let certificate = certificates::find(db, best).await?.map(|certificate| InWords::new(certificate).values);
         let simulated_walks = execution::newest(db, best).await?.map(|kept| {
             let report = kept.reported.report;
-            format!("{} Mean number of strides: {:.2}.", report.sentence(), report.mean_strides())
+            format!("{} Mean strides: {:.2}.", report.sentence(), report.mean_strides())
         });
         let has_gait = gaits::exists(db, best).await?;
         Ok(Self { certification, certificate: certificate.unwrap_or_default(), simulated_walks, has_gait })

@@ -232,7 +232,7 @@ fn columns(choice: &TrialsQuery, listing: &Listing, bounds: bool) -> Result<Vec<
 
 fn heading(sort: &'static str) -> (&'static str, String) {
     let (label, meaning) = match sort {
-        "number" => ("Trial", "In the order in which they were proposed"),
+        "number" => ("Trial", "Trials are numbered in the order in which they were proposed"),
         "state" => ("State", ""),
         "gait_rmse_rad" => ("RMSE, rad", "Gait RMSE against the reference gait"),
         "cost_of_transport" => ("Cost", "Cost of transport, no unit"),
