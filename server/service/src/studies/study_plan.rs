@@ -84,7 +84,7 @@ pub struct NewStudy {
     /// The gait from which trials are warm-started.
     #[serde(default = "incumbent")]
     pub warm_start_from: WarmStartFrom,
-    /// Simulated walks with each gait. They do nothing by default.
+    /// Simulated walks with each gait. By default, the service simulates none.
     #[serde(default)]
     #[schema(value_type = study_plan_schemas::SimulatedWalksSchema)]
     pub simulated_walks: SimulatedWalks,
