@@ -161,7 +161,7 @@ async fn programs_change_and_undo_answers() {
         (undo, "was already undone"),
         (of(&restored), "An undo cannot be undone"),
         (of(&first), "no longer counts: another answer was given instead"),
-        (of(&of_gait_rmse(&service, study).await), "Only answers of people"),
+        (of(&of_gait_rmse(&service, study).await), "Only people's answers"),
     ] {
         let refused = service.post(&path, &json!({})).await;
         assert_eq!(
