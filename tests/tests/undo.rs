@@ -170,7 +170,7 @@ async fn programs_change_and_undo_answers() {
         );
         assert!(refused.text.contains(why), "{why}: {}", refused.text);
     }
-    // Only an answer of a person about the same two trials can be replaced, and once.
+    // Only a person's answer about the same two trials can be replaced, and once.
     let other = service.trials(study).await.into_iter().rfind(|trial| trial.state == TrialState::Converged).unwrap().id;
     let elsewhere = json!({"trial_a": a, "trial_b": other, "answer": "a", "author": "S01", "replaces": restored["id"]});
     for (body, status) in [

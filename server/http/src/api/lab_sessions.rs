@@ -169,7 +169,7 @@ pub(super) async fn unblind(
 
 /// Get the next walk of a lab session
 ///
-/// The view for the lab, without anything that reveals a gait.
+/// The response omits all data that would reveal a gait.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/next-walk",
