@@ -346,7 +346,10 @@ async fn walks_with_a_gait_that_a_script_evaluated_are_refused() {
             assert!(reasons.iter().any(|reason| refused.text.contains(reason)), "{}", refused.text);
         }
         let page = service.fetch(&format!("/trials/{trial}?sensitivities=true")).await.text;
-        assert_eq!(page.contains("so its solution is not stored here"), outcome["label"] == "converged");
+        assert_eq!(
+            page.contains("so its gait is not stored here and sensitivities cannot be computed"),
+            outcome["label"] == "converged"
+        );
     }
     service.stop().await;
 }

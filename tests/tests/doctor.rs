@@ -94,7 +94,7 @@ fn doctor_reports_a_clock_before_the_installation_of_the_program() {
 fn doctor_refuses_a_database_without_a_name() {
     let folder = tempfile::tempdir().unwrap();
     let record = only_error(doctor(folder.path(), &["--database", ""]));
-    assert!(record.contains("The database must be the name of a file."), "{record}");
+    assert!(record.contains("The path of the database is empty; it must name a file."), "{record}");
 }
 
 #[tokio::test]

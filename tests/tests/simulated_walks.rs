@@ -1,4 +1,4 @@
-//! Studies with simulated walks: reports, ties of Gait RMSE, and gaits that are not executable, with the real optimiser on
+//! Studies with simulated walks: reports, ties in Gait RMSE, and gaits that are not executable, with the real optimiser on
 //! a coarse mesh.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -156,7 +156,7 @@ async fn gaits_with_too_few_strides_are_labelled_and_never_recommended() {
         assert_eq!((trial.state, reported(&service.store, trial).await), (expected, Some(strides)));
     }
     let trial = trials.iter().find(|trial| trial.state == TrialState::NotExecutable).expect("a gait that falls");
-    assert!(trial.message.contains("fewer than 20"), "{}", trial.message);
+    assert!(trial.message.contains("fewer than the minimum of 20 for an executable gait"), "{}", trial.message);
     assert!(trials.iter().all(|trial| trial.state != TrialState::Converged), "{:?}", results(&trials));
 
     let shown = service.fetch(&format!("/api/v1/trials/{}", trial.id)).await.json();

@@ -161,7 +161,7 @@ async fn programs_change_and_undo_answers() {
         (undo, "was already undone"),
         (of(&restored), "An undo cannot be undone"),
         (of(&first), "no longer counts: another answer was given instead"),
-        (of(&of_gait_rmse(&service, study).await), "Only answers of people"),
+        (of(&of_gait_rmse(&service, study).await), "Only people's answers"),
     ] {
         let refused = service.post(&path, &json!({})).await;
         assert_eq!(
@@ -170,7 +170,7 @@ async fn programs_change_and_undo_answers() {
         );
         assert!(refused.text.contains(why), "{why}: {}", refused.text);
     }
-    // Only an answer of a person about the same two trials can be replaced, and once.
+    // Only a person's answer about the same two trials can be replaced, and once.
     let other = service.trials(study).await.into_iter().rfind(|trial| trial.state == TrialState::Converged).unwrap().id;
     let elsewhere = json!({"trial_a": a, "trial_b": other, "answer": "a", "author": "S01", "replaces": restored["id"]});
     for (body, status) in [

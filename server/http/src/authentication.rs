@@ -121,7 +121,7 @@ fn bearer(headers: &HeaderMap) -> Result<Option<&str>, Error> {
     let token = value.to_str().ok().and_then(|text| text.split_once(' '));
     match token {
         Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => Ok(Some(token.trim())),
-        _ => Err(Error::NotSignedIn("The Authorization header must be Bearer TOKEN.".to_owned())),
+        _ => Err(Error::NotSignedIn("The Authorization header must have the form `Bearer TOKEN`.".to_owned())),
     }
 }
 

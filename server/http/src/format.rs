@@ -104,8 +104,8 @@ pub(crate) fn simulated_walks(walks: &SimulatedWalks) -> Option<String> {
     let SimulatedWalks { effect, number, gait_rmse_tolerance_rad, least_mean_strides } = walks;
     let what = match effect {
         SimulatedWalksEffect::None => return None,
-        SimulatedWalksEffect::Report => "report".to_owned(),
-        SimulatedWalksEffect::TieBreak => format!("break ties of Gait RMSE within {gait_rmse_tolerance_rad} rad"),
+        SimulatedWalksEffect::Report => "execution report for each gait".to_owned(),
+        SimulatedWalksEffect::TieBreak => format!("break ties in Gait RMSE within {gait_rmse_tolerance_rad} rad"),
         SimulatedWalksEffect::Label => {
             format!("label gaits with fewer than {least_mean_strides} mean strides as not executable")
         }

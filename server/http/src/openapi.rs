@@ -208,7 +208,7 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
     for (status, description) in problems {
         responses.entry(status).or_insert_with(|| json!({ "description": description }));
     }
-    for (status, of) in [("201", "what was made, or of the list or object that has it"), ("202", "the job")] {
+    for (status, of) in [("201", "the new object, or of the list or object that contains it"), ("202", "the job")] {
         if let Some(response) = responses.get_mut(status) {
             response["headers"]["Location"] =
                 json!({ "description": format!("URL of {of}"), "schema": { "type": "string" } });

@@ -26,7 +26,8 @@ const REFERENCE_FILE: &str = "A file in the format that `format` names, with its
 
 /// Component, field, and the rule.
 const AUTHOR: &str = "The name of the signed-in user, unless `source` is `subject` or `script`.";
-const REPLACED: &str = "An answer of this study to the same comparison, which counts, by the same author.";
+const REPLACED: &str = "A person's answer to the same comparison in this study. It still counts, and is neither a rater's answer \
+                        nor a safety report.";
 /// Query parameter and the rule.
 const PARAMETER_RULES: [(&str, &str); 3] = [
     ("cursor", "The value of `next` from a page of this list with the same filters and order."),

@@ -48,7 +48,7 @@ const LEARNER: [Described; 21] = [
         "Threshold between the labels *not converged* and *converged*, in units of utility.",
     ),
     ("LearnerSettings", "coactive_noise", "Noise scale of suggestions, in units of utility."),
-    ("LearnerSettings", "no_difference_noise", "Noise scale of answers of no difference, in units of utility."),
+    ("LearnerSettings", "no_difference_noise", "Noise scale of answers that state no difference, in units of utility."),
     ("LearnerSettings", "no_difference_width", "Difference in utility below which two gaits feel equal."),
     (
         "LearnerSettings",

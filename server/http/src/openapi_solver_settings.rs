@@ -24,8 +24,8 @@ const NUMBERS: [(&str, f64, f64, &str); 5] = [
         "proximal_first",
         0.0,
         1e4,
-        "Initial weight of the proximal term after steps that the line search shortened often. Default 1e-4. 0 disables \
-         the term.",
+        "Initial weight of the proximal term after a step that the line search shortened many times. Default 1e-4. 0 \
+         disables the term.",
     ),
     (
         "required_reduction",
@@ -45,7 +45,8 @@ const COUNTS: [(&str, &str); 3] = [
     ("max_second_order_corrections", "Maximum number of second-order corrections in each iteration. Default 1."),
     (
         "short_step_limit",
-        "Number of consecutive steps below 0.05 after which the restoration phase starts. Default 5. 0: never.",
+        "Number of consecutive steps below 0.05 after which the restoration phase starts. Default 5. With 0, short \
+         steps do not start it.",
     ),
 ];
 
@@ -60,7 +61,7 @@ const WORDS: [(&str, &[&str], &str); 2] = [
         "linear_solver",
         &["auto", "multifrontal", "delayed_pivots"],
         "Factorisation of the linear systems: `multifrontal`, pivots within blocks; `delayed_pivots`, pivots by a threshold, \
-         slower; `auto`, the first one, and the second one where it is inaccurate. Default `auto`.",
+         slower; `auto`, `multifrontal`, or `delayed_pivots` where the former is inaccurate. Default `auto`.",
     ),
 ];
 

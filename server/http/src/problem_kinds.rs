@@ -147,7 +147,7 @@ impl ProblemKind {
                 "/problems/cannot-be-undone",
                 StatusCode::CONFLICT,
                 "The answer cannot be undone",
-                "An answer of a person can be undone once, within two minutes, while it counts. Safety reports and answers \
+                "A person's answer can be undone once, within two minutes, as long as it counts. Safety reports and answers \
                  that an undo brought back cannot be undone. Nothing was changed.",
                 "Change the answer, or retract it with a reason. Staff review safety reports.",
             ),

@@ -22,7 +22,7 @@ pub enum StoreError {
         source: std::io::Error,
     },
     /// The name of the file is empty.
-    #[error("The database must be the name of a file.")]
+    #[error("The path of the database is empty; it must name a file.")]
     NoFileName,
     /// The file is not a database of this program.
     #[error("{} is not a Gaitwright database: {reason}.", path.display())]

@@ -294,7 +294,7 @@ pub(super) const FORGERIES: [Forgery; 74] = [
     (
         "a preference from nowhere",
         |r| of_source(r, "clinician")["source"] = "evaluation".into(),
-        "the source of a preference cannot be evaluation",
+        "the source of a preference is evaluation; it must be gait_rmse, subject, clinician or script",
     ),
     (
         "an answer by a name with spaces around it",
@@ -325,7 +325,7 @@ pub(super) const FORGERIES: [Forgery; 74] = [
         |r| {
             add_answer(r, 1, "Nina", |row| row["replaces"] = "01900000-0000-7000-8000-000000000009".into());
         },
-        "replaces no answer about its two trials",
+        "replaces an answer that is missing or not about the same two trials",
     ),
     (
         "an answer in place of one that counts",

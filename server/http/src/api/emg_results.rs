@@ -38,7 +38,7 @@ fn of_settings(error: Error) -> Error {
 
 /// Create an EMG result
 ///
-/// Processes EMG recordings: filters, segments and normalises the newest EMG recordings. Can be repeated with other settings.
+/// Filters, segments and normalises the newest EMG recording of each walk. Can be repeated with other settings.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/emg-results",

@@ -68,7 +68,7 @@ async fn repeat_ask(app: &AppState, before: Response) -> Result<Response, Refusa
 
 /// Tell the service the result of a trial
 ///
-/// That there is no gait is also a result. If the script fails, cancel the trial instead.
+/// `not_converged` is also a result. If the script fails, cancel the trial instead.
 #[utoipa::path(
     post,
     path = "/trials/{id}/tell",

@@ -95,7 +95,7 @@ pub(super) async fn get(
     Ok(Json(view(&lab_sessions::get(&mut *app.read().await?, id).await?)))
 }
 
-/// Closing of a session.
+/// Request to close a lab session.
 #[derive(Debug, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LabSessionClosing {
@@ -107,7 +107,7 @@ pub(super) struct LabSessionClosing {
 
 /// Close a lab session
 ///
-/// A closed session accepts no more data.
+/// A closed session accepts no more data except safety reports.
 #[utoipa::path(
     post,
     path = "/lab-sessions/{id}/close",
@@ -131,7 +131,7 @@ pub(super) async fn close(
     request.done(&app, writer, &view(&session)).await
 }
 
-/// Session to unblind, with the reason.
+/// Request to unblind a lab session.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LabSessionUnblinding {
@@ -169,7 +169,7 @@ pub(super) async fn unblind(
 
 /// Get the next walk of a lab session
 ///
-/// The view for the lab, without anything that reveals a gait.
+/// The response omits all data that would reveal a gait.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/next-walk",

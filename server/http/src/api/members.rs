@@ -140,7 +140,7 @@ pub(super) async fn end(
 #[derive(Debug, Clone, Copy, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StudyRestriction {
-    /// Whether only members and administrators can access the study. Raters must be members in any case.
+    /// Whether only members and administrators can access the study. Raters must always be members.
     restricted: bool,
 }
 

@@ -182,8 +182,8 @@ pub(super) struct AnswerRetraction {
 
 /// Retract a preference
 ///
-/// The preference stays on record, but the learner no longer uses it. An answer that it replaced does not count again:
-/// for that, undo it.
+/// The preference stays on record, but the learner no longer uses it. An answer that it replaced does not count again;
+/// to restore that answer, undo the preference instead.
 #[utoipa::path(
     post,
     path = "/preferences/{id}/retract",

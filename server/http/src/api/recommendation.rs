@@ -41,9 +41,9 @@ pub(super) struct Recommendation {
     certificate: CertificateState,
     /// Reasons if the certificate failed.
     failures: Vec<String>,
-    /// If the certificate failed, the best action whose gait passed. Null if there is none.
+    /// If the certificate failed, the best action whose gait passed certification. Null if there is none.
     passing: Option<Recommended>,
-    /// Tuned bounds that were active in no gait of the study so far.
+    /// Tuned bounds that have not been active in any gait of the study so far.
     never_active: Vec<String>,
     /// The newest execution report of its gait. Null if there is none.
     execution_report: Option<ExecutionReport>,

@@ -63,7 +63,7 @@ impl<'de> Deserialize<'de> for Sort {
 /// List trials of a study
 ///
 /// Sorted by number, unless `sort` names another column. A trial whose value in that column changes while a client reads
-/// the pages can be missing or occur twice; no number of a trial changes.
+/// the pages can be missing or occur twice. The number of a trial never changes.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials",

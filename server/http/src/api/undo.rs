@@ -15,7 +15,7 @@ use gaitwright_store::{AnswerId, AssessmentId, FeedbackId};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Undo of an answer.
+/// Request to undo an answer.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnswerUndo {

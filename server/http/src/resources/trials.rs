@@ -43,7 +43,7 @@ pub(crate) struct Trial {
     /// script that evaluated it did not report the value.
     cost_of_transport: Option<f64>,
     /// Mean strides of the simulated walks on which the result of the trial depends. Null if the trial has no gait, or if
-    /// the study compares and labels no gait by simulated walks.
+    /// the results of the study do not depend on simulated walks.
     mean_strides: Option<f64>,
     /// Objective of the solve. Null without a completed solve.
     objective: Option<f64>,

@@ -23,7 +23,7 @@ pub fn too_large_to_wait(trials: usize, answers: usize) -> Option<String> {
     if trials >= MANY {
         return Some(format!("{MANY} trials or more"));
     }
-    (answers > MOST_ANSWERS).then(|| format!("more than {MOST_ANSWERS} answers"))
+    (answers > MOST_ANSWERS).then(|| format!("more than {MOST_ANSWERS} labels and answers"))
 }
 
 /// Number of studies whose results are cached.

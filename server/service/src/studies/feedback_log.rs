@@ -209,8 +209,8 @@ pub(super) async fn suggest(
         grounds.admit(trial).map_err(|reason| refuse("the bounds of a walkable gait").because(&reason))?;
         if is_same_gait(trial, over) {
             let reason = format!(
-                "Trial {} already has these bounds, and its gait is the same as that of the rated trial.",
-                trial.number
+                "Trial {} already has these bounds, and its gait is the same as that of trial {}.",
+                trial.number, over.number
             );
             return Err(refuse("the bounds of a different gait").because(&reason).into());
         }

@@ -66,8 +66,8 @@ pub struct Answer {
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub note: String,
-    /// Identifier of the preference or assessment that this answer replaces: an answer of a person about the same two
-    /// trials, which no longer counts. If this answer is undone, the replaced one counts again.
+    /// Identifier of the preference or assessment that this answer replaces: a person's answer about the same two trials,
+    /// which then no longer counts. If this answer is undone, the replaced one counts again.
     #[serde(default)]
     pub replaces: Option<AnswerId>,
 }

@@ -199,7 +199,7 @@ pub(super) async fn replace(
     };
     consents::may_be_shown(writer, study).await?;
     if answer.is_computed() || answer.pair() != Some((pair.0.min(pair.1), pair.0.max(pair.1))) {
-        return Err(refused("an answer of a person about the same two trials"));
+        return Err(refused("a person's answer about the same two trials"));
     }
     if answer.is_by_rater() {
         return Err(Error::conflict("A rater's answer cannot be changed. Give your own answer."));

@@ -110,12 +110,14 @@ pub async fn of(
 
 fn may_take_a_trial(study: &Study) -> Result<(), NoRelaxedTrial> {
     let refused = match study.state {
-        _ if study.plan.evaluation == Evaluation::Script => "A lab script evaluates the trials of this study.",
+        _ if study.plan.evaluation == Evaluation::Script => {
+            "A lab script evaluates the trials of this study, so no trial can be requested here."
+        }
         _ if study.archived_at.is_some() => {
             "The study is archived. Press \u{201c}Show in the list of studies again\u{201d} on its page \u{201c}Name, tags and notes\u{201d} first."
         }
         StudyState::Running | StudyState::Finished => return Ok(()),
-        StudyState::NotStarted => "The study has not started.",
+        StudyState::NotStarted => "The study has not started. Start it first.",
         StudyState::Waiting => "The study is waiting for an answer. Answer the comparison first.",
         StudyState::Paused => "The study is paused. Resume it first.",
         StudyState::Stopped => "The study was stopped. Extend it first.",

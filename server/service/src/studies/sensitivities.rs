@@ -53,7 +53,7 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
     let number = trial.number;
     if trial.script.is_some() {
         return Err(Error::conflict(format!(
-            "Trial {number} was evaluated by a script, so its solution is not stored here and sensitivities cannot be computed."
+            "Trial {number} was evaluated by a script, so its gait is not stored here and sensitivities cannot be computed."
         )));
     }
     if !trial.state.has_gait() {

@@ -26,8 +26,7 @@ pub(super) fn check(plan: &StudyPlan) -> Result<(), Error> {
         return Err(Error::invalid(field, json!(least_mean_strides), &format!("0 to {strides}")));
     }
     if effect != SimulatedWalksEffect::None && plan.evaluation == Evaluation::Script {
-        let allowed =
-            "none, because scripts evaluate the trials of this study, so that their gaits are not stored here";
+        let allowed = "none, because scripts evaluate the trials of this study and their gaits are not stored here";
         return Err(Error::invalid("simulated_walks.effect", effect.as_str(), allowed));
     }
     if effect == SimulatedWalksEffect::TieBreak && plan.answer_source == AnswerSource::People {
@@ -52,7 +51,7 @@ pub(super) fn label_of_gait(walks: &SimulatedWalks, mean_strides: Option<f64>) -
 /// Why a gait is not executable.
 pub(super) fn why_not_executable(walks: &SimulatedWalks, mean_strides: f64) -> String {
     format!(
-        "Simulated walks with this gait last {mean_strides:.2} strides on average, fewer than {}, the least number for an executable gait of this study.",
+        "Simulated walks with this gait last {mean_strides:.2} strides on average, fewer than the minimum of {} for an executable gait in this study.",
         walks.least_mean_strides
     )
 }

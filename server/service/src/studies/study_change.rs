@@ -16,7 +16,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyChange {
-    /// Name shown to users, which no other study that you can see has.
+    /// Name shown to users, which must differ from the names of all other studies that you can see.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 120)]
     pub name: Option<String>,

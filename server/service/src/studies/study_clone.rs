@@ -13,7 +13,8 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, Default, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyClone {
-    /// Name shown to users, which no other study that you can see has. That of the parent and "(clone)" by default.
+    /// Name shown to users, which must differ from the names of all studies that you can see. By default, it is the name
+    /// of the parent with "(clone)" appended.
     #[serde(default)]
     pub name: Option<String>,
     /// Seed for all random draws except allocations.

@@ -27,7 +27,8 @@ use utoipa::ToSchema;
 pub struct NewStudy {
     /// Identifier of the subject.
     pub subject_id: SubjectId,
-    /// Name shown to users, which no other study that you can see has. Made from subject and variant by default.
+    /// Name shown to users, which must differ from the names of all studies that you can see. By default, it is made from
+    /// subject, variant and seed.
     #[serde(default)]
     pub name: Option<String>,
     /// Identifier of the device. The built-in one by default.
@@ -84,7 +85,7 @@ pub struct NewStudy {
     /// The gait from which trials are warm-started.
     #[serde(default = "incumbent")]
     pub warm_start_from: WarmStartFrom,
-    /// Simulated walks with each gait. They do nothing by default.
+    /// Simulated walks with each gait. By default, the service simulates none.
     #[serde(default)]
     #[schema(value_type = study_plan_schemas::SimulatedWalksSchema)]
     pub simulated_walks: SimulatedWalks,

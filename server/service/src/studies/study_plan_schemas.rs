@@ -51,16 +51,16 @@ pub struct DimensionSchema {
 #[derive(Debug, ToSchema)]
 #[schema(as = SimulatedWalks)]
 pub struct SimulatedWalksSchema {
-    /// What they do.
+    /// Effect of the simulated walks on the study.
     #[schema(required = false, default = "none")]
     pub effect: SimulatedWalksEffect,
     /// Number of simulated walks on each of the three kinds of ground, 1 to 1000.
     #[schema(required = false, default = 50, minimum = 1, maximum = 1000)]
     pub number: u32,
-    /// `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
+    /// `tie_break`: difference in Gait RMSE, rad, below which two gaits are compared by their mean strides. 0 to 10.
     #[schema(required = false, default = 0.05, minimum = 0, maximum = 10)]
     pub gait_rmse_tolerance_rad: f64,
-    /// `label`: the least mean number of strides of an executable gait. A complete walk has 20 strides. 0 to 20.
+    /// `label`: minimum mean strides of an executable gait. A complete simulated walk has 20 strides. 0 to 20.
     #[schema(required = false, default = 3.0, minimum = 0, maximum = 20)]
     pub least_mean_strides: f64,
 }

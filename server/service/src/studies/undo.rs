@@ -41,7 +41,7 @@ pub enum NotUndone {
     #[error("Only the rater who gave this answer can undo it.")]
     ByRater,
     /// The service computed it.
-    #[error("Only answers of people can be undone. The service computed this entry.")]
+    #[error("Only people's answers can be undone. The service computed this entry.")]
     Computed,
     /// The author of the answer that would be brought back has answered the comparison again.
     #[error("{0} has answered this comparison again since. Retract this answer instead.")]

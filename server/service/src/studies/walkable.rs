@@ -88,7 +88,7 @@ pub enum NotWalkable {
     /// Another trial of the subject has the same gait, which has a safety report in force.
     #[error(
         "Trial {number} has the same gait as {other}, which was reported as unsafe by {by}. Do not walk with it until staff \
-         have cleared {other}."
+         have cleared the gait of {other}."
     )]
     SameGaitReportedUnsafe {
         /// Number of the trial.

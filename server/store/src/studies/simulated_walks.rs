@@ -3,20 +3,20 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// What the simulated walks with a new gait do in a study: `none`, the service simulates none by itself; `report`, each
-/// gait gets an execution report; `tie_break`, the report also decides between two gaits with nearly the same Gait RMSE;
-/// `label`, a gait that walks too few strides gets the label `not_executable`.
+/// Effect of simulated walks with each gait on a study: `none`, the service simulates none by itself; `report`, each gait
+/// gets an execution report; `tie_break`, the report also decides between two gaits with nearly the same Gait RMSE;
+/// `label`, a gait with too few mean strides gets the label `not_executable`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SimulatedWalksEffect {
     /// The service simulates no walks by itself.
     #[default]
     None,
-    /// Each gait gets an execution report, which changes no trial.
+    /// Each gait gets an execution report; trials are not affected.
     Report,
     /// The report also decides between two gaits with nearly the same Gait RMSE.
     TieBreak,
-    /// A gait that walks too few strides gets the label *not executable*.
+    /// A gait with too few mean strides gets the label *not executable*.
     Label,
 }
 
@@ -45,13 +45,13 @@ impl SimulatedWalksEffect {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SimulatedWalks {
-    /// What they do.
+    /// Effect of the simulated walks on the study.
     pub effect: SimulatedWalksEffect,
     /// Number of simulated walks on each of the three kinds of ground, 1 to 1000.
     pub number: u32,
-    /// `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
+    /// `tie_break`: difference in Gait RMSE, rad, below which two gaits are compared by their mean strides. 0 to 10.
     pub gait_rmse_tolerance_rad: f64,
-    /// `label`: the least mean number of strides of an executable gait. A complete walk has 20 strides. 0 to 20.
+    /// `label`: minimum mean strides of an executable gait. A complete simulated walk has 20 strides. 0 to 20.
     pub least_mean_strides: f64,
 }
 

@@ -163,7 +163,7 @@ pub(crate) struct AuditDetail {
     /// `gait.review`: the safety reports that were reviewed.
     #[schema(required = false)]
     safety_reports: Vec<AuditedSafetyReport>,
-    /// `record.backup`: true.
+    /// `record.backup`: always true.
     #[schema(required = false)]
     scheduled: bool,
     /// `token.create`: scopes of the token.

@@ -18,7 +18,7 @@ pub(crate) struct ControllerFile {
     fields: BTreeMap<String, String>,
     /// Name of the device.
     device: String,
-    /// Whether the gait passed its certificate. Absent in the file of a blinded walk, because it could identify the gait.
+    /// Whether the certificate of the gait passed. Absent in the file of a blinded walk, because it could identify the gait.
     #[schema(required = false)]
     certificate_passed: bool,
     /// Time from one right heel strike to the next, s.

@@ -73,7 +73,7 @@ struct DomainTrajectory {
     contact_forces: Vec<Vec<f64>>,
     /// States of the muscles. Null without muscles.
     muscles: Option<MuscleTrajectory>,
-    /// Coordinates that the virtual constraints drive, as places in a row of `q`, from 0.
+    /// Coordinates that the virtual constraints drive, as indices into a row of `q`, counted from 0.
     #[schema(value_type = Vec<u32>)]
     outputs: Vec<usize>,
     /// For each output, the 6 Bezier coefficients of its curve over the phase, rad.

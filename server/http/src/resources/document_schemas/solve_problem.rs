@@ -75,11 +75,11 @@ struct PrimalDualPoint {
     lower_multipliers: Vec<f64>,
     /// n multipliers of the upper bounds of variables.
     upper_multipliers: Vec<f64>,
-    /// m slacks of the rows. Empty: the values of the rows.
+    /// m slacks of the rows. If empty, the values of the rows are used.
     slacks: Vec<f64>,
-    /// m multipliers of the lower bounds of slacks. Empty: from the multipliers of the rows.
+    /// m multipliers of the lower bounds of slacks. If empty, they are derived from the multipliers of the rows.
     slack_lower_multipliers: Vec<f64>,
-    /// m multipliers of the upper bounds of slacks. Empty: from the multipliers of the rows.
+    /// m multipliers of the upper bounds of slacks. If empty, they are derived from the multipliers of the rows.
     slack_upper_multipliers: Vec<f64>,
 }
 

@@ -104,7 +104,7 @@ fn root(
         return Ok(None);
     }
     if outcome.report.status != SolveStatus::Converged {
-        let why = "The default bounds have no gait with these settings, so there is no root gait.";
+        let why = "No gait was found with the default bounds and these settings, so there is no root gait.";
         return Err(Error::Malformed(why.to_owned()));
     }
     let solved = SolvedAction::of(ActionIndex(0), &outcome, &problem.reference)?;

@@ -27,7 +27,7 @@ pub struct EmgReading {
     pub heel_strike_column: Option<String>,
     /// Value of `heel_strike_column`, in the unit of the column, above which the foot is on the ground.
     pub heel_strike_threshold: f64,
-    /// Numbers of strides to leave out, from 1, in the order of the heel strikes.
+    /// Numbers of the strides to leave out, counted from 1 in the order of the heel strikes.
     pub rejected_strides: Vec<u32>,
     /// Name of the file, as it is shown.
     #[schema(max_length = 200)]

@@ -20,7 +20,8 @@ pub enum WalkCondition {
 }
 
 /// State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `answered`, the
-/// subject has answered, so no walk is left; `closed`, the session accepts no more data.
+/// subject has answered, so no walk is left; `closed`, the session accepts no more data except
+/// safety reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LabSessionState {
@@ -30,7 +31,7 @@ pub enum LabSessionState {
     UnderWay,
     /// The subject has answered, so no walk is left.
     Answered,
-    /// The session accepts no more data.
+    /// The session accepts no more data except safety reports.
     Closed,
 }
 

@@ -19,7 +19,8 @@ pub(super) fn answer_changes(rows: &[FeedbackRow], assessments: &[Assessment]) -
         let Some(replaced) = answer.replaces() else { continue };
         let fault = |fault: &str| refuse(format!("answer {} {fault}", answer.id()));
         let known = by_id.get(&replaced).filter(|known| known.pair().is_some() && known.pair() == answer.pair());
-        let known = known.ok_or_else(|| fault("replaces no answer about its two trials"))?;
+        let known =
+            known.ok_or_else(|| fault("replaces an answer that is missing or not about the same two trials"))?;
         if known.is_computed() || known.is_by_rater() || known.is_safety_report() {
             return Err(fault("replaces an answer that nobody can change"));
         }

@@ -134,7 +134,12 @@ fn check_feedback(row: &FeedbackRow, study: &Study, trials: &HashMap<TrialId, &T
                 return Err("it compares a trial that did not converge".to_owned());
             }
             match row.source {
-                Source::Evaluation => return Err("the source of a preference cannot be evaluation".to_owned()),
+                Source::Evaluation => {
+                    return Err(
+                        "the source of a preference is evaluation; it must be gait_rmse, subject, clinician or script"
+                            .to_owned(),
+                    );
+                }
                 Source::GaitRmse => {
                     if study.plan.answer_source == AnswerSource::People {
                         return Err("Gait RMSE answers a comparison in a study where people answer".to_owned());

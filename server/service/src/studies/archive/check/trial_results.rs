@@ -52,7 +52,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
         return Err(format!("status {status} contradicts the state {}", trial.state.as_str()));
     }
     if trial.mean_strides.is_some() != (trial.state.has_gait() && walks.effect.is_part_of_result()) {
-        return Err("its mean_strides do not fit the setting simulated_walks of the study".to_owned());
+        return Err("its mean_strides contradict the setting simulated_walks of the study".to_owned());
     }
     let Some(report) = &trial.report else {
         return if trial.state.has_gait() { Err("the solve report is missing".to_owned()) } else { Ok(()) };
