@@ -87,7 +87,7 @@ async fn report_has_a_deviation_band_or_states_that_it_has_none() {
         assert_eq!(report.contains("so there is no band"), id.is_some());
         assert!(report.contains("measured against the reference gait Falisse 2019, subject 1"), "{report}");
         // The service of this test passed them.
-        assert!(report.contains("2 of 2 best gaits pass certification"), "{report}");
+        assert!(report.contains("2 of 2 best gaits passed certification"), "{report}");
         assert!(
             report.contains("Subject 1: Gait RMSE of the best action is lower with muscles")
                 && report.contains("1.58 against 1.80")
