@@ -63,13 +63,15 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}; share of a change in speed that remains after one stride: {:.1e}; share that spreads to other coordinates: {:.1e}",
+            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
-            if map.is_stable() { "stable" } else { "unstable" },
-            map.speed_kept,
-            map.speed_leak
+            if map.is_stable() { "stable" } else { "unstable" }
+        ));
+        lines.push(format!(
+            "  change in speed: share that remains after one stride {:.1e}, share that spreads to other coordinates {:.1e}",
+            map.speed_kept, map.speed_leak
         ));
         lines.push(format!(
             "  largest deviation of the gait from the periodic motion: {:.1e} (rad or rad/s); {STRIDES} strides simulated",
