@@ -98,12 +98,17 @@ impl JointRecording {
 
     fn whole(table: &Table, joints: Vec<(&'static str, Vec<f64>)>) -> Result<Self, ModelError> {
         if joints.is_empty() {
-            let reason = format!("no column is a joint angle; the columns are {}", table.names().join(", "));
+            let reason =
+                format!("no column has the name of a joint angle; the columns are {}", table.names().join(", "));
             return Err(table.malformed_names(reason));
         }
         for (joint, angles) in &joints {
             if let Some(row) = angles.iter().position(|angle| angle.abs() > LARGEST_ANGLE_RAD) {
-                let reason = format!("{joint} is {:.1} rad; check the unit", angles[row]);
+                let angle = angles[row];
+                let reason = format!(
+                    "{joint} is {angle:.1} rad; plausible angles are at most {LARGEST_ANGLE_RAD:.2} rad in either direction; \
+                     check the unit"
+                );
                 return Err(table.malformed_row(row, None, reason));
             }
         }

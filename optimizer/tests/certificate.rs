@@ -242,7 +242,7 @@ fn incomplete_gait_is_rejected_with_the_field() {
     assert!(matches!(certify(&gait), Err(ModelError::OutOfRange { field, .. }) if field == "number of domains"));
     let mut gait = whole.clone();
     gait.domains[1].u.pop();
-    assert!(certify(&gait).unwrap_err().to_string().contains("DS3_R: u has 8 entries, expected 9"));
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS3_R: u has 8 entries; it must have 9"));
     let mut gait = whole.clone();
     gait.domains[3].time_s.iter_mut().for_each(|time| *time += 1.0);
     let refused = certify(&gait).unwrap_err().to_string();
@@ -258,7 +258,7 @@ fn incomplete_gait_is_rejected_with_the_field() {
     }
     let mut gait = whole.clone();
     gait.domains[0].impulse = None;
-    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_R: impulse is absent; entries expected: 4"));
+    assert!(certify(&gait).unwrap_err().to_string().contains("DS2_R: impulse is absent; it must have 4 entries"));
     let mut gait = whole;
     gait.domains[4].q[2][3] = f64::NAN;
     assert!(certify(&gait).unwrap_err().to_string().contains("DS2_L: a number is not finite"));

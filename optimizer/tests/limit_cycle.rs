@@ -75,7 +75,8 @@ fn incomplete_recordings_are_rejected_with_their_place() {
     let refusal = |text: &str| JointRecording::from_csv("walk.csv", text).unwrap_err().to_string();
     assert!(refusal(&csv().replace("\n0.5,", "\n0.5,x")).contains("walk.csv, line 53, column 2"));
     assert!(refusal(&csv().replace("\n0.5,", "\n0.5,9")).contains("walk.csv, line 53"), "an angle of more than pi");
-    assert!(refusal(&csv().replace("knee_R_rad", "knee")).contains("no column is a joint angle; the columns are knee"));
+    let unnamed = refusal(&csv().replace("knee_R_rad", "knee"));
+    assert!(unnamed.contains("no column has the name of a joint angle; the columns are knee"), "{unnamed}");
     let gap: Vec<String> = csv().lines().filter(|line| !line.starts_with("0.5")).map(str::to_owned).collect();
     assert!(
         refusal(&gap.join("\n")).contains("walk.csv, line 53, column 1: there is a gap of 0.110 s between rows"),

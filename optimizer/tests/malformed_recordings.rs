@@ -93,7 +93,7 @@ fn malformed_opensim_files_are_rejected_with_place_and_reason() {
         (
             "wrong unit",
             change("inDegrees=yes", "inDegrees=no"),
-            "walk.mot, line 8: torso_rad is 7.0 rad; at most 3.14 rad is plausible; check the unit",
+            "walk.mot, line 8: torso_rad is 7.0 rad; plausible angles are at most 3.14 rad in either direction; check the unit",
         ),
         (
             "radians under a header of degrees",
@@ -228,7 +228,7 @@ fn malformed_tables_are_rejected_with_place_and_reason() {
             (
                 "degrees",
                 own.replace(",0.400000,", ",23,"),
-                "own.csv, line 3: knee_L_rad is 23.0 rad; at most 3.14 rad is plausible; check the unit",
+                "own.csv, line 3: knee_L_rad is 23.0 rad; plausible angles are at most 3.14 rad in either direction; check the unit",
             ),
             (
                 "hip missing",
@@ -343,9 +343,13 @@ fn malformed_joint_tables_are_rejected_with_place_and_reason() {
             (
                 "no joint",
                 whole.replace("_rad", ""),
-                "angles.csv, line 2: no column is a joint angle; the columns are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
+                "angles.csv, line 2: no column has the name of a joint angle; the columns are torso, hip_L, knee_L, ankle_L, hip_R, knee_R",
             ),
-            ("degrees", whole.replace(",0.400000,", ",23,"), "angles.csv, line 3: knee_L is 23.0 rad; check the unit"),
+            (
+                "degrees",
+                whole.replace(",0.400000,", ",23,"),
+                "angles.csv, line 3: knee_L is 23.0 rad; plausible angles are at most 3.14 rad in either direction; check the unit",
+            ),
             (
                 "a gap",
                 whole

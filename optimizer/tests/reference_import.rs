@@ -429,11 +429,11 @@ fn impossible_mean_strides_are_rejected() {
     let cases: [(Angles, &str); 6] = [
         (
             |[torso, rest @ ..]| with_torso(torso + 0.8, rest),
-            "torso_rad is 52° on average over the stride; at most 45° in either direction is plausible; check the sign, and that upright is 0°",
+            "torso_rad is 52° on average over the stride; plausible averages are at most 45° in either direction; check the sign, and that upright is 0°",
         ),
         (
             |[torso, rest @ ..]| with_torso(torso - 1.0, rest),
-            "torso_rad is -51° on average over the stride; at most 45° in either direction is plausible; check the sign, and that upright is 0°",
+            "torso_rad is -51° on average over the stride; plausible averages are at most 45° in either direction; check the sign, and that upright is 0°",
         ),
         (
             |angles| with_knee(angles, 0.25 * angles[2]),
@@ -441,11 +441,11 @@ fn impossible_mean_strides_are_rejected() {
         ),
         (
             |angles| with_knee(angles, angles[2] + 0.8),
-            "knee_L_rad is bent by at least 57° throughout the stride; its minimum must be at most 40°",
+            "knee_L_rad shows at least 57° of flexion throughout the stride; its minimum must be at most 40°",
         ),
         (
             |angles| with_ankle(angles, angles[3] + std::f64::consts::FRAC_PI_2),
-            "ankle_L_rad is 92° on average over the stride; at most 30° in either direction is plausible; check that the angle is 0° when \
+            "ankle_L_rad is 92° on average over the stride; plausible averages are at most 30° in either direction; check that the angle is 0° when \
              foot and shank are perpendicular",
         ),
         (

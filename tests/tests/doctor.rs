@@ -87,7 +87,7 @@ fn doctor_reports_a_clock_before_the_installation_of_the_program() {
     let report = cli::run(program.to_str().unwrap(), folder.path(), &["doctor", "--listen", "127.0.0.1:0"]);
     let lines: Vec<String> = String::from_utf8(report.stdout).unwrap().lines().map(str::to_owned).collect();
     let clock = only_error((report.status.code(), lines));
-    assert!(clock.contains("when this program was installed: the clock is wrong"), "{clock}");
+    assert!(clock.contains("when the file of this program was written: the clock is wrong"), "{clock}");
 }
 
 #[test]

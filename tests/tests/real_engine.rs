@@ -389,7 +389,7 @@ async fn failed_trial_sets_the_exit_code() {
         cli::run(BINARY, folder.path(), &["tune", "--muscles", "off", "--trials", "2", "--workers", "1", "--json"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{text}");
-    assert!(text.contains("1 of 2 trials failed; the last one was trial 1: ") && text.contains("panics"), "{text}");
+    assert!(text.contains("trial 1 of 2 failed: ") && text.contains("panics"), "{text}");
     assert_eq!((&json_of(&output)["study_id"], &json_of(&output)["state"]), (&json!(study), &json!("finished")));
 }
 

@@ -13,7 +13,7 @@ pub(crate) fn check_pattern(
 ) -> Result<(), NlpError> {
     let fail = |what: String| Err(NlpError::InvalidProblem(format!("{name} pattern: {what}")));
     if pattern.rows != rows || pattern.columns != columns {
-        return fail(format!("its size is {} x {}, expected {rows} x {columns}", pattern.rows, pattern.columns));
+        return fail(format!("its size is {} x {}; it must be {rows} x {columns}", pattern.rows, pattern.columns));
     }
     let starts = &pattern.column_starts;
     if starts.len() != columns + 1

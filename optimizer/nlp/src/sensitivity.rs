@@ -73,7 +73,7 @@ pub enum SensitivityError {
     #[error(transparent)]
     Invalid(#[from] NlpError),
     /// A derivative has another length than its part of the program.
-    #[error("derivative of {what} has length {found}, expected {expected}")]
+    #[error("the derivative of {what} has length {found}; it must be {expected}")]
     Length {
         /// Which derivative.
         what: &'static str,
@@ -91,7 +91,7 @@ pub enum SensitivityError {
     )]
     Irregular,
     /// No factorisation solves the linear system to the residual limit of the settings.
-    #[error("the linear system is solved only to a relative residual of {0:.1e}")]
+    #[error("the linear system could be solved only to a relative residual of {0:.1e}")]
     Inaccurate(f64),
 }
 

@@ -173,10 +173,10 @@ fn take_multipliers(form: &Formulation, warm: &WarmPoint, least: f64, point: &mu
 pub(crate) fn check_start(form: &Formulation, start: &StartPoint) -> Result<(), NlpError> {
     let check = |name: &str, values: &[f64], expected: usize| {
         if values.len() != expected {
-            return Err(NlpError::InvalidStart(format!("{name} has length {}, expected {expected}", values.len())));
+            return Err(NlpError::InvalidStart(format!("{name} has length {}; it must be {expected}", values.len())));
         }
         match values.iter().position(|v| !v.is_finite()) {
-            Some(i) => Err(NlpError::InvalidStart(format!("{name}[{i}] is {}", values[i]))),
+            Some(i) => Err(NlpError::InvalidStart(format!("{name}[{i}] is {}; it must be finite", values[i]))),
             None => Ok(()),
         }
     };

@@ -13,7 +13,7 @@ impl SimulatedWalksOnGround {
 }
 
 impl ExecutionReport {
-    /// How many walks were complete on each ground.
+    /// How many walks were complete on each kind of ground.
     pub fn sentence(&self) -> String {
         let mut grounds: Vec<String> = self
             .grounds

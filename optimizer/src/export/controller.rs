@@ -75,7 +75,7 @@ pub struct ControllerFile {
     pub fields: BTreeMap<String, String>,
     /// Name of the prosthesis.
     pub device: String,
-    /// Whether the gait passed its certificate. Absent in the file of a blinded walk, because it could identify the
+    /// Whether the certificate of the gait passed. Absent in the file of a blinded walk, because it could identify the
     /// gait.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub certificate_passed: Option<bool>,

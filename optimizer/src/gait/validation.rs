@@ -45,9 +45,11 @@ fn check_times(trajectory: &DomainTrajectory, start_s: f64) -> Result<(), String
     let planned = |k: usize| start_s + trajectory.duration_s * k as f64 / gaps;
     let in_time = |(k, time): (usize, &f64)| (time - planned(k)).abs() <= ROUNDING;
     match trajectory.time_s.iter().enumerate().position(|point| !in_time(point)) {
-        Some(k) => {
-            Err(format!("time_s[{k}] is {}, expected {:.6} from the durations", trajectory.time_s[k], planned(k)))
-        }
+        Some(k) => Err(format!(
+            "time_s[{k}] is {}; it must be {:.6}, computed from the durations",
+            trajectory.time_s[k],
+            planned(k)
+        )),
         None => Ok(()),
     }
 }
@@ -55,11 +57,11 @@ fn check_times(trajectory: &DomainTrajectory, start_s: f64) -> Result<(), String
 /// Checks that a trajectory belongs to the domain. The error is the reason.
 fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result<(), String> {
     if trajectory.name != domain.name() {
-        return Err(format!("the name is {:?}, expected {:?}", trajectory.name, domain.name()));
+        return Err(format!("the name is {:?}; it must be {:?}", trajectory.name, domain.name()));
     }
     let points = trajectory.q.len();
     if points < 3 || points.is_multiple_of(2) {
-        return Err(format!("it has {points} nodes, expected an odd number of at least 3"));
+        return Err(format!("the number of nodes is {points}; it must be odd and at least 3"));
     }
     let contacts = domain.contact_rows();
     let outputs = domain.outputs();
@@ -73,7 +75,7 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
         return Err("contact_rows do not match the domain".to_owned());
     }
     if trajectory.outputs != outputs {
-        return Err(format!("outputs are {:?}, expected {outputs:?}", trajectory.outputs));
+        return Err(format!("outputs are {:?}; they must be {outputs:?}", trajectory.outputs));
     }
     let mut lengths = vec![
         ("time_s", trajectory.time_s.len(), points),
@@ -99,14 +101,14 @@ fn check(trajectory: &DomainTrajectory, domain: Domain, muscles: bool) -> Result
         lengths.push(("activation", states.activation.len(), points));
     }
     if let Some((name, found, expected)) = lengths.into_iter().find(|(_, found, expected)| found != expected) {
-        return Err(format!("{name} has {found} entries, expected {expected}"));
+        return Err(format!("{name} has {found} entries; it must have {expected}"));
     }
     let impulses = trajectory.impulse.as_ref().map(Vec::len);
     let expected = domain.opens_with_impact().then_some(contacts.len());
     if impulses != expected {
         let found = impulses.map_or_else(|| "is absent".to_owned(), |count| format!("has {count} entries"));
-        let wanted = expected.map_or_else(|| "none".to_owned(), |count| count.to_string());
-        return Err(format!("impulse {found}; entries expected: {wanted}"));
+        let wanted = expected.map_or_else(|| "be absent".to_owned(), |count| format!("have {count} entries"));
+        return Err(format!("impulse {found}; it must {wanted}"));
     }
     let forward = trajectory.phase_end_m > trajectory.phase_start_m;
     if !(forward && trajectory.duration_s > 0.0 && trajectory.duration_s.is_finite()) {

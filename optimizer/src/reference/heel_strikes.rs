@@ -7,6 +7,9 @@ use std::ops::Range;
 /// The error if heel strikes cannot be found from joint angles.
 const NO_KNEE: &str = "the recording has no right knee angle (column knee_R_rad), which is needed to find heel strikes from joint \
                        angles; give the times of the right heel strikes, or use a force under the right foot";
+/// The error if heel strikes cannot be found from forces.
+const NO_FORCE: &str =
+    "the recording has no force under the right foot; add the force, or find the heel strikes in another way";
 /// Vertical force above which the foot is in contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
 /// Shortest time without contact before a heel strike, s.
@@ -91,7 +94,7 @@ impl MotionRecording {
                 times.clone()
             }
             HeelStrikes::Force => {
-                let none = || malformed("the recording has no force under the right foot".to_owned());
+                let none = || malformed(NO_FORCE.to_owned());
                 let force = self.right_force.as_ref().ok_or_else(none)?;
                 let mut strikes = contacts(&force.time_s, &force.force_n, CONTACT_FORCE_N);
                 let (first, last) = (self.time_s[0], self.time_s[self.time_s.len() - 1]);

@@ -173,7 +173,7 @@ impl MotionRecording {
             if let Some(row) = column.iter().position(|a| a.abs() > LARGEST_ANGLE_RAD) {
                 let angle = column[row];
                 let reason = format!(
-                    "{name} is {angle:.1} rad; at most {LARGEST_ANGLE_RAD:.2} rad is plausible; check the unit"
+                    "{name} is {angle:.1} rad; plausible angles are at most {LARGEST_ANGLE_RAD:.2} rad in either direction; check the unit"
                 );
                 return Err(table.malformed_row(row, None, reason));
             }

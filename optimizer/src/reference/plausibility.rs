@@ -37,7 +37,7 @@ fn torso(degrees: &[f64]) -> Option<String> {
     let lean = average(degrees);
     (lean.abs() > LARGEST_LEAN_DEG).then(|| {
         let reason = format!(
-            "is {lean:.0}° on average over the stride; at most {LARGEST_LEAN_DEG}° in either direction is plausible"
+            "is {lean:.0}° on average over the stride; plausible averages are at most {LARGEST_LEAN_DEG}° in either direction"
         );
         format!("{reason}; check the sign, and that upright is 0°")
     })
@@ -53,7 +53,7 @@ fn knee(degrees: &[f64]) -> Option<String> {
     }
     (least > LARGEST_LEAST_FLEXION_DEG).then(|| {
         let straight = format!("its minimum must be at most {LARGEST_LEAST_FLEXION_DEG}°");
-        format!("is bent by at least {least:.0}° throughout the stride; {straight}")
+        format!("shows at least {least:.0}° of flexion throughout the stride; {straight}")
     })
 }
 
@@ -62,7 +62,7 @@ fn ankle(degrees: &[f64]) -> Option<String> {
     let (mean, range) = (average(degrees), highest - lowest);
     if mean.abs() > LARGEST_ANKLE_MEAN_DEG {
         let reason = format!(
-            "is {mean:.0}° on average over the stride; at most {LARGEST_ANKLE_MEAN_DEG}° in either direction is plausible"
+            "is {mean:.0}° on average over the stride; plausible averages are at most {LARGEST_ANKLE_MEAN_DEG}° in either direction"
         );
         return Some(format!("{reason}; check that the angle is 0° when foot and shank are perpendicular"));
     }

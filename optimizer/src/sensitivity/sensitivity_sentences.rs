@@ -31,8 +31,9 @@ impl GaitSensitivities {
         let mut sentences: Vec<String> =
             self.bounds.iter().filter(matters).map(|bound| bound.sentence(self.cost_of_transport, angles)).collect();
         let others: Vec<&str> = self.bounds.iter().filter(|bound| !matters(bound)).map(|bound| bound.bound).collect();
-        if !others.is_empty() {
-            sentences.push(format!("Small changes in {} have no effect.", others.join(", ")));
+        if let Some((last, first)) = others.split_last() {
+            let listed = if first.is_empty() { (*last).to_owned() } else { format!("{} and {last}", first.join(", ")) };
+            sentences.push(format!("Small changes in {listed} have no effect."));
         }
         sentences
     }

@@ -94,7 +94,7 @@ class Requests(unittest.TestCase):
         self.assertEqual(len(service.requests), 2)
 
     def test_another_program_at_the_address_is_named(self) -> None:
-        with Service((200, b"<html>", {})) as service, self.assertRaisesRegex(ValueError, "no Gaitwright service"):
+        with Service((200, b"<html>", {})) as service, self.assertRaisesRegex(ValueError, "not a Gaitwright service"):
             service.client.get_caller()
 
     def test_operation_that_returns_a_secret_is_sent_once_without_a_key(self) -> None:

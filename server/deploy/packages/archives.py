@@ -15,7 +15,7 @@ class File(NamedTuple):
 
 
 def tar_gz(files: List[File], with_folders: bool = False) -> bytes:
-    """A compressed tar archive, if asked with an entry for each folder."""
+    """A compressed tar archive; `with_folders` adds an entry for each folder."""
     plain = io.BytesIO()
     known = set()
     with tarfile.open(fileobj=plain, mode="w", format=tarfile.GNU_FORMAT) as archive:

@@ -16,8 +16,9 @@ Depends: libc6 (>= {glibc}), libgcc-s1
 Section: science
 Priority: optional
 Description: tuning of walking gaits for powered prostheses
- Gaitwright tunes walking gaits of powered prostheses: an optimiser computes
- gaits, a preference learner proposes bounds, people or motion capture compare.
+ Gaitwright tunes walking gaits of powered prostheses: a preference learner
+ proposes bounds, an optimiser computes gaits within them, and people or Gait
+ RMSE compare the gaits.
 """
 # The administrator starts the service after editing the settings.
 POSTINST = """#!/bin/sh

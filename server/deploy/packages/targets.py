@@ -36,7 +36,7 @@ class Target(NamedTuple):
             return f"py3-none-{WINDOWS[self.machine]}"
         if "apple" in self.triple:
             return f"py3-none-{MACOS[self.machine]}"
-        raise SystemExit(f"There is no tag of a wheel for {self.triple}.")
+        raise SystemExit(f"There is no wheel tag for {self.triple}. Targets: Linux with glibc, macOS, Windows.")
 
 
 def host() -> Target:
@@ -44,7 +44,7 @@ def host() -> Target:
     about = subprocess.run(["rustc", "-vV"], check=True, capture_output=True, text=True).stdout
     found = re.search(r"^host: (\S+)$", about, re.MULTILINE)
     if found is None:
-        raise SystemExit("rustc -vV names no host.")
+        raise SystemExit("The output of rustc -vV does not name the host.")
     return Target(found.group(1))
 
 
@@ -52,5 +52,5 @@ def glibc_of(program: bytes) -> Tuple[int, int]:
     """The newest version of glibc whose symbols a program uses."""
     versions = [(int(major), int(minor)) for major, minor in re.findall(rb"\0GLIBC_(\d+)\.(\d+)", program)]
     if not versions:
-        raise SystemExit("The program names no version of glibc.")
+        raise SystemExit("The program does not state the glibc version that it needs.")
     return max(versions)

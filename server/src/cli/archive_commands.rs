@@ -51,7 +51,8 @@ pub(super) struct ImportCommand {
     from: PathBuf,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
-    /// Public key that the archive's signature must match, as printed by `gaitwright signing-key`; can be repeated.
+    /// Public key that must have signed the archive, as printed by `gaitwright signing-key`. If the flag is
+    /// repeated, any one of the keys is sufficient.
     #[arg(long, value_name = "KEY")]
     trust: Vec<PublicKey>,
 }

@@ -50,7 +50,7 @@ impl AtlasCommand {
         let stopped = cancel.clone();
         let progress_path = progress_path(&self.out);
         let workers = cores_or(self.workers);
-        tell(&format!("solves so far: {}", progress_path.display()));
+        tell(&format!("partial results: {}", progress_path.display()));
         let pool = Pool::new(1);
         let made = pool.run(move |pool| {
             let bar = ProgressBar::no_length();
@@ -63,7 +63,7 @@ impl AtlasCommand {
             made
         });
         let Some(finished) = made.await?? else {
-            tell("stopped; run the same command again to continue");
+            tell("interrupted; run the same command again to continue");
             return Ok(CommandEnd::Interrupted);
         };
         out.append(&atlas_table::text(&finished.map))?;
@@ -80,7 +80,7 @@ impl AtlasCommand {
                 });
                 let (finished, found) = search.await??;
                 if matches!(found, BestCertifiedGaitSearch::Cancelled) {
-                    tell("stopped; run the same command again to continue");
+                    tell("interrupted; run the same command again to continue");
                     return Ok(CommandEnd::Interrupted);
                 }
                 write_best(found, file)?;

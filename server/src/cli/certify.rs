@@ -58,17 +58,20 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
     lines.extend(certificate.failures_in_words().iter().map(|failure| format!("  failure: {failure}")));
     for check in &certificate.checks {
         let (value, limit) = (check.value_in_words(), check.limit_in_words());
-        lines.push(format!("  {}: {value} (allowed: {limit}; {})", check.name_in_words(), check.place));
+        let allowed = if check.limit.is_some() { format!("allowed: {limit}") } else { limit };
+        lines.push(format!("  {}: {value} ({allowed}; {})", check.name_in_words(), check.place));
     }
     if let Some(map) = &certificate.return_map {
         lines.push(format!(
-            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}; {:.1e} of a change in speed remains after one stride, and {:.1e} of it spreads to other coordinates",
+            "  largest multiplier {:.4e} (finite differences: {:.4e}, resolution {:.0e}): {}",
             map.largest,
             map.largest_by_differences,
             map.differences_resolve,
-            if map.is_stable() { "stable" } else { "unstable" },
-            map.speed_kept,
-            map.speed_leak
+            if map.is_stable() { "stable" } else { "unstable" }
+        ));
+        lines.push(format!(
+            "  change in speed: share that remains after one stride {:.1e}, share that spreads to other coordinates {:.1e}",
+            map.speed_kept, map.speed_leak
         ));
         lines.push(format!(
             "  largest deviation of the gait from the periodic motion: {:.1e} (rad or rad/s); {STRIDES} strides simulated",

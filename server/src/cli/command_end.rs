@@ -41,8 +41,13 @@ pub(super) fn without_result(StudySnapshot { study, trials, .. }: &StudySnapshot
         return Some(format!("the study is {}: {}", study.state.as_str(), study.state_reason));
     }
     let last = trials.iter().rev().find(failed)?;
-    let count = trials.iter().filter(failed).count();
-    Some(format!("{count} of {} trials failed; the last one was trial {}: {}", trials.len(), last.number, last.message))
+    let all = trials.len();
+    Some(match trials.iter().filter(failed).count() {
+        1 => format!("trial {} of {all} failed: {}", last.number, last.message),
+        count => {
+            format!("{count} of {all} trials failed; the last of them was trial {}: {}", last.number, last.message)
+        }
+    })
 }
 
 /// Reports an error. Returns the exit code of the command that it ended.

@@ -125,16 +125,16 @@ async fn clock(database: &Path) -> CheckOutcome {
     let present = now();
     if let Some(program) = program_written().filter(|&written| behind(present, written)) {
         return Trouble(format!(
-            "{present} is earlier than {program}, when this program was installed: the clock is wrong"
+            "{present} is earlier than {program}, when the file of this program was written: the clock is wrong"
         ));
     }
     if !database.is_file() {
         return Good(present.to_string());
     }
     match access_clock::latest_of_file(database).await {
-        Ok(Some(latest)) if behind(present, latest) => {
-            Trouble(format!("{present} is earlier than {latest} in the record: the clock was set back"))
-        }
+        Ok(Some(latest)) if behind(present, latest) => Trouble(format!(
+            "{present} is earlier than {latest}, the latest time in the record: the clock was set back"
+        )),
         Ok(_) => Good(present.to_string()),
         // The check of the record has the error.
         Err(_) => Good(format!("{present}, not compared with the record")),

@@ -35,7 +35,7 @@ pub(super) struct EmgCommand {
     /// Column of right heel strikes in both files: a switch under the heel, or the vertical force under the foot.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
     heel_strike_column: Option<String>,
-    /// Value of the --heel-strike-column, in the unit of the column, above which the foot is on the ground.
+    /// Value in the column of --heel-strike-column above which the foot is on the ground, in the unit of that column.
     #[arg(long, value_name = "NUMBER", default_value = "0.5", value_parser = number, allow_negative_numbers = true)]
     heel_strike_threshold: f64,
     /// Times of right heel strikes in the recording, as in 0.41,1.52,2.63.
@@ -169,8 +169,8 @@ impl EmgCommand {
 fn for_people(found: &EmgResults) -> String {
     let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = found.settings;
     let mut lines = vec![format!(
-        "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; relative to the \
-        peak without the device"
+        "band-pass {band_low_hz} to {band_high_hz} Hz, low-pass {envelope_hz} Hz, order {order}, zero-phase; values relative \
+        to the peak without the device"
     )];
     let Activity { channels, averages, emg_rmse } = &found.activity;
     for (place, (channel, average)) in channels.iter().zip(averages).enumerate() {

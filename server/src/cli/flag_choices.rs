@@ -42,7 +42,7 @@ pub(super) const WARM_STARTS: [FlagChoice; 2] = [
 
 /// What simulated walks can do in a study.
 pub(super) const SIMULATED_WALKS: [FlagChoice; 4] = [
-    ("none", "Nothing: no walks are simulated"),
+    ("none", "No walks are simulated"),
     ("report", "Each gait gets an execution report; trials are not affected"),
     ("tie_break", "Two gaits with nearly the same Gait RMSE are compared by their mean strides"),
     ("label", "A gait with too few mean strides is labelled not executable and is never recommended"),

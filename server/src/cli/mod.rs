@@ -127,7 +127,7 @@ enum Command {
     Users(users::UsersCommand),
     /// Delete old trajectories; the service must be stopped.
     ///
-    /// Results, answers and recommended gaits are kept. Expired idempotency keys, sessions and sign-in links are deleted.
+    /// Results, answers and recommended gaits are kept. Also deletes expired idempotency keys, sessions and sign-in links.
     Prune(prune::PruneCommand),
 }
 

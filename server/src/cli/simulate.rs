@@ -89,10 +89,10 @@ fn for_people(report: &ExecutionReport) -> String {
     lines.extend(report.grounds.iter().flat_map(ground_for_people));
     lines.push(match report.pushes {
         Some(pushes) => format!(
-            "  pushes survived at the hip: {:.0} N s forwards, {:.0} N s backwards (largest push tried: {:.0} N s)",
+            "  largest push at the hip that the walker survives: {:.0} N s forwards, {:.0} N s backwards (largest push tried: {:.0} N s)",
             pushes.forwards_n_s, pushes.backwards_n_s, pushes.largest_tried_n_s
         ),
-        None => "  pushes: not tried, because the undisturbed walk is not complete".to_owned(),
+        None => "  pushes at the hip: not tried, because the undisturbed walk is not complete".to_owned(),
     });
     lines.push(
         "  the intact side is a model of a person who tracks the gait; a real person may do better or worse".to_owned(),

@@ -70,7 +70,7 @@ pub(super) struct SolveCommand {
     #[arg(long)]
     json: bool,
     /// If no gait is found, explain which bounds conflict, and whether relaxing any one of them, or a few together, gives
-    /// a gait. Takes dozens of solves; Ctrl-C stops it and prints what it has found.
+    /// a gait. Takes dozens of solves. Ctrl-C stops the explanation; the conflicts and relaxations found so far are printed.
     #[arg(long)]
     explain: bool,
     /// Certify a converged gait, as `certify` does. With --json, adds the member `certificate`.

@@ -31,7 +31,7 @@ pub(super) struct SweepCommand {
     #[arg(long, value_name = "FILE.csv")]
     actions: PathBuf,
     /// Output file with one row for each action, in the same order. Until it is complete, rows are in a hidden file
-    /// next to it (.NAME.csv.PID.part, with the process identifier), which remains if the process is killed.
+    /// next to it (.NAME.csv.PID.part, with the process ID), which remains if the process is killed.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
     /// Number of solves that run in parallel (default: number of cores).

@@ -57,7 +57,7 @@ pub(super) struct TuneCommand {
     simulated_walks: SimulatedWalksFlags,
     #[command(flatten)]
     pub(super) record: AnchoredFlags,
-    /// Print one JSON object at the end, and the line of each trial to stderr.
+    /// Print one JSON object at the end, and one line for each trial to stderr.
     #[arg(long)]
     json: bool,
 }

@@ -44,7 +44,7 @@ pub(crate) fn check_blocks(form: &Formulation, blocks: &EliminationBlocks) -> Re
         }
         if low != high {
             return fail(format!(
-                "entry ({i}, {j}) couples blocks {} and {}, neither an ancestor of the other",
+                "entry ({i}, {j}) couples blocks {} and {}, of which neither is an ancestor of the other",
                 of[i], of[j]
             ));
         }

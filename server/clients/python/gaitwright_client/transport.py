@@ -61,7 +61,7 @@ class Transport:
         try:
             return json.loads(content)
         except ValueError:
-            raise ValueError(f"{self.address}{path} did not answer with JSON, so it is no Gaitwright service") from None
+            raise ValueError(f"{self.address}{path} did not answer with JSON, so it is not a Gaitwright service") from None
 
     def request_text(self, verb: str, path: str, at: Optional[Mapping[str, str]] = None, **more: Any) -> str:
         return self.request_bytes(verb, path, at, **more).decode("utf-8-sig")

@@ -64,7 +64,7 @@ pub(super) struct ReproduceCommand {
     /// Number of trials in each study.
     #[arg(long, default_value = "30", value_name = "NUMBER", value_parser = trials, allow_negative_numbers = true)]
     trials: u32,
-    /// First seed. Both studies of a subject use the same seed.
+    /// First seed. The two studies of a comparison, with and without muscles, use the same seed.
     #[arg(long, default_value = "1", value_name = "NUMBER", value_parser = seed, allow_negative_numbers = true)]
     seed: u64,
     /// Number of consecutive seeds. Several are needed, because local optima can tip the comparison either way.

@@ -57,12 +57,14 @@ fn stable(outcomes: &[ReproducedStudy]) -> Statement {
     let fallback = outcomes.iter().filter(|outcome| outcome.passing.is_some()).count();
     let others = match with_gait - passed {
         0 => String::new(),
-        failed => format!("; in {fallback} of the {failed} studies whose best gait failed, a lower-ranked gait passes"),
+        failed => format!(
+            "; in {fallback} of the {failed} studies whose best gait failed certification, a lower-ranked gait passed"
+        ),
     };
     Statement {
         paper: "Both gaits are stable limit cycles (figure 5)".to_owned(),
         here: format!(
-            "{passed} of {with_gait} best gaits pass certification (20 strides of the simulated closed loop, multipliers, \
+            "{passed} of {with_gait} best gaits passed certification (20 strides of the simulated closed loop, multipliers, \
              constraints between nodes){others}"
         ),
         agrees: match passed {

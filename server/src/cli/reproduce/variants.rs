@@ -69,7 +69,7 @@ impl ReproducedStudy {
             (CertificateState::Failed, None) => "failed".to_owned(),
             (CertificateState::Failed, Some((number, rmse))) => {
                 let rmse = rmse.map_or_else(String::new, |rmse| format!(" ({rmse:.4} rad)"));
-                format!("failed; trial {number}{rmse} passes")
+                format!("failed; the certificate of trial {number}{rmse} passed")
             }
         }
     }

@@ -83,7 +83,7 @@ pub(in crate::cli) struct Flags {
     /// Headers of trusted proxies: x-forwarded or forwarded (default: x-forwarded).
     #[arg(long, value_name = "KIND")]
     pub(super) proxy_headers: Option<String>,
-    /// PEM file with the certificate chain; enables HTTPS, with --tls-key.
+    /// PEM file with the certificate chain. HTTPS needs this file and --tls-key.
     #[arg(long, value_name = "FILE")]
     pub(super) tls_certificate: Option<String>,
     /// PEM file with the private key.

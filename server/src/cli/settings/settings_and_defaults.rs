@@ -3,7 +3,7 @@
 /// Every setting: name in the file, default, meaning. The environment variable derives from the name.
 pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("listen", "127.0.0.1:8080", "address and port to listen on"),
-    ("database", "gaitwright.db", "SQLite file"),
+    ("database", "gaitwright.db", "SQLite file of the record"),
     ("anchor", "", "second anchor file, preferably on another disk; the first one is next to the database"),
     ("backup_folder", "", "folder for scheduled backups, preferably on another disk; empty: no backups"),
     ("backup_hours", "24", "hours between scheduled backups"),
@@ -15,7 +15,7 @@ pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("sign_in", "true", "whether users and programs must sign in; false only on a loopback address"),
     ("idle_minutes", "60", "minutes without a request after which a session ends"),
     ("session_hours", "12", "hours after which a session ends even if it is in use"),
-    ("tls_certificate", "", "PEM file with the certificate chain; enables HTTPS, with tls_key"),
+    ("tls_certificate", "", "PEM file with the certificate chain; HTTPS needs this file and tls_key"),
     ("tls_key", "", "PEM file with the private key"),
     ("trusted_proxies", "", "comma-separated addresses and networks of reverse proxies whose headers are trusted"),
     (

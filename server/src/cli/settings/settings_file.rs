@@ -23,7 +23,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<BTreeMap<String, String>,
             toml::Value::Integer(number) => number.to_string(),
             toml::Value::Float(number) => number.to_string(),
             toml::Value::Boolean(flag) => flag.to_string(),
-            _ => return Err(malformed(format!("{name} must be a string, a number or true/false."))),
+            _ => return Err(malformed(format!("{name} must be a string, a number, true or false."))),
         };
         values.insert(name, value);
     }
