@@ -189,7 +189,7 @@ async fn import_form_imports_and_keeps_the_input_after_an_error() {
     let page = service.fetch(imported.headers["location"].to_str().unwrap()).await.text;
     assert!(
         page.contains("ground_force_vy is the force under the right foot")
-            && page.contains("heel strikes by the vertical force")
+            && page.contains("heel strikes detected from the vertical force")
     );
     // More than the usual limit of a body is accepted here, and only here.
     let mut body = new("long", 1.7);

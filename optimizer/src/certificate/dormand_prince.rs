@@ -20,7 +20,7 @@ pub(super) enum StepError {
     Singular,
     /// The step size fell below its minimum.
     #[error(
-        "the integration step became too small, because contacts, virtual constraints and hip phase are nearly singular"
+        "the integration step became too small, because the equations of contacts, virtual constraints and hip phase are nearly singular"
     )]
     TooSmall,
 }

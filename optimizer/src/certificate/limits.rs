@@ -3,7 +3,7 @@
 use super::checked_quantity::Quantity;
 use super::findings::MeasuredQuantity;
 
-/// Vertical force from which a gait laboratory registers contact, N. Smaller violations are irrelevant in practice.
+/// Vertical force above which a gait laboratory registers contact, N. Smaller violations are irrelevant in practice.
 const CONTACT_THRESHOLD_N: f64 = 20.0;
 /// Friction of that force at a coefficient of 0.6, N.
 const FRICTION_THRESHOLD_N: f64 = 12.0;
@@ -31,8 +31,10 @@ pub(super) const KEPT_LOAD: MeasuredQuantity =
     MeasuredQuantity::new("C3 load of contacts before they lift off", "N", 1e-3, None);
 pub(super) const PROGRESS: MeasuredQuantity =
     MeasuredQuantity::new("C3 forward hip velocity in SS1", "m/s", 1e-6, Some(0.02));
-pub(super) const DEPTH: MeasuredQuantity = MeasuredQuantity::new("C3 feet above the ground", "m", 1e-7, Some(1e-3));
-pub(super) const CLEARANCE: MeasuredQuantity = MeasuredQuantity::new("C3 swing clearance (a5)", "m", 1e-7, Some(1e-3));
+pub(super) const DEPTH: MeasuredQuantity =
+    MeasuredQuantity::new("C3 depth of the feet below the ground", "m", 1e-7, Some(1e-3));
+pub(super) const CLEARANCE: MeasuredQuantity =
+    MeasuredQuantity::new("C3 shortfall of swing clearance (a5)", "m", 1e-7, Some(1e-3));
 pub(super) const ANGLE: MeasuredQuantity =
     MeasuredQuantity::new("C4 joint angles beyond a6, a7, a8", "rad", 1e-6, Some(0.01));
 pub(super) const SPEED: MeasuredQuantity = MeasuredQuantity::new("C4 velocities beyond a1", "rad/s", 3e-6, Some(0.1));
@@ -70,8 +72,8 @@ pub(super) const CLOSED_LOOP_ORBIT_RATE: Quantity = Quantity::limited("orbit err
 // cross it by the mesh error. The limit is the force below which a gait laboratory does not register contact.
 pub(super) const CLOSED_LOOP_NORMAL_FORCE: Quantity = Quantity::limited("unilateral contact", "N", CONTACT_THRESHOLD_N);
 pub(super) const CLOSED_LOOP_FRICTION: Quantity = Quantity::limited("friction cone", "N", FRICTION_THRESHOLD_N);
-pub(super) const CLOSED_LOOP_TORQUE: Quantity = Quantity::limited("torques", "N m", 5.0);
-pub(super) const CLOSED_LOOP_ANGLE: Quantity = Quantity::limited("joint angles", "rad", 0.01);
-pub(super) const CLOSED_LOOP_SPEED: Quantity = Quantity::limited("velocities", "rad/s", 0.2);
-pub(super) const CLOSED_LOOP_DEPTH: Quantity = Quantity::limited("feet above the ground", "m", 1e-3);
+pub(super) const CLOSED_LOOP_TORQUE: Quantity = Quantity::limited("torques beyond their limits", "N m", 5.0);
+pub(super) const CLOSED_LOOP_ANGLE: Quantity = Quantity::limited("joint angles beyond their limits", "rad", 0.01);
+pub(super) const CLOSED_LOOP_SPEED: Quantity = Quantity::limited("velocities beyond their limits", "rad/s", 0.2);
+pub(super) const CLOSED_LOOP_DEPTH: Quantity = Quantity::limited("depth of the feet below the ground", "m", 1e-3);
 pub(super) const CLOSED_LOOP_IMPULSE: Quantity = Quantity::limited("tensile landing impulse", "N s", 0.0);

@@ -31,7 +31,12 @@ impl Gait {
         }
         for (field, found, expected, of) in [
             ("stride_time_s", self.stride_time_s, elapsed, ("s", "the sum of the durations of the domains")),
-            ("speed_m_s", self.speed_m_s, self.stride_length_m / elapsed, ("m/s", "the stride length per stride time")),
+            (
+                "speed_m_s",
+                self.speed_m_s,
+                self.stride_length_m / elapsed,
+                ("m/s", "the stride length divided by the stride time"),
+            ),
         ] {
             ModelError::check_related_range(field, found, (expected - ROUNDING, expected + ROUNDING), of)?;
         }

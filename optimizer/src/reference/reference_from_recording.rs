@@ -75,8 +75,10 @@ impl MotionRecording {
         let found = match how {
             HeelStrikes::Given(_) => "given",
             HeelStrikes::Ends => "at the ends of the recording",
-            HeelStrikes::Force => "by the vertical force under the right foot (above 20 N for 50 ms)",
-            HeelStrikes::Kinematics => "by the right heel farthest ahead of the pelvis (Zeni et al. 2008)",
+            HeelStrikes::Force => "detected from the vertical force under the right foot (above 20 N for 50 ms)",
+            HeelStrikes::Kinematics => {
+                "detected where the right heel is farthest ahead of the pelvis (Zeni et al. 2008)"
+            }
         };
         let mut steps = self.steps.clone();
         steps.push(format!("{} right heel strikes {found}: {} s", strikes.len(), in_words(&strikes)));

@@ -63,7 +63,7 @@ fn title(status: StatusCode, detail: &str) -> Option<&'static str> {
     match status {
         StatusCode::CONFLICT if detail == StoreError::Withdrawn.to_string() => Some("Consent withdrawn"),
         StatusCode::CONFLICT => Some("Not possible at present"),
-        StatusCode::UNPROCESSABLE_ENTITY => Some("An entry is not accepted"),
+        StatusCode::UNPROCESSABLE_ENTITY => Some("An entry was not accepted"),
         _ => None,
     }
 }

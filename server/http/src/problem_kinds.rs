@@ -185,7 +185,7 @@ impl ProblemKind {
                 StatusCode::UNPROCESSABLE_ENTITY,
                 "Cursor of another list",
                 "The cursor comes from a page of another list, or of this list with other filters or in another order.",
-                "Repeat the path, the filters and the order of the first page in the request of every further page, or leave out \
+                "Repeat the path, the filters and the order of the first page in the request for each further page, or leave out \
                  the cursor to begin with the first page.",
             ),
             Self::Learner => entry(

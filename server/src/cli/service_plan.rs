@@ -68,7 +68,7 @@ impl ServicePlan {
             return Err(settings.refused("trusted_proxies", allowed));
         }
         if !settings.host_names().iter().all(|name| is_loopback_name(name)) {
-            let allowed = "localhost, because the service runs without sign-in and other names let other machines change everything";
+            let allowed = "localhost, because the service runs without sign-in and other names would let other machines change everything";
             return Err(settings.refused("host_names", allowed));
         }
         Ok(())

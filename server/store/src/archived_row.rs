@@ -206,7 +206,7 @@ impl<'de> Visitor<'de> for CellVisitor {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Cell, A::Error> {
         let bytes = match map.next_entry::<Name, Hexadecimal>()? {
             Some((name, bytes)) if name.0 == HEXADECIMAL => bytes.0,
-            _ => return Err(A::Error::custom("an object is not a binary value")),
+            _ => return Err(A::Error::custom("an object must be a binary value")),
         };
         match map.next_key::<Name>()? {
             None => Ok(Cell::Blob(bytes)),

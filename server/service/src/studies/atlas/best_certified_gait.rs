@@ -52,8 +52,8 @@ pub(super) fn search(
             return Ok(BestCertifiedGaitSearch::Cancelled);
         }
         if outcome.report.status != SolveStatus::Converged {
-            let why = "did not converge again. With a time limit, a result depends on the speed of the machine.";
-            return Err(Error::Malformed(format!("The solve of gait {number} {why}")));
+            let why = "this time the solve did not converge. With a time limit, a result depends on the speed of the machine.";
+            return Err(Error::Malformed(format!("Gait {number} was solved again, and {why}")));
         }
         let certificate = certify(&outcome.gait)?;
         if certificate.passed {

@@ -49,7 +49,7 @@ pub(super) fn values(trial: &Trial, plan: &StudyPlan) -> Result<(), String> {
     let state = state.map(TrialState::from);
     if state != Some(trial.state) {
         let status = serde_json::json!(trial.status);
-        return Err(format!("status {status} contradicts the state {}", trial.state.as_str()));
+        return Err(format!("the status {status} contradicts the state {}", trial.state.as_str()));
     }
     if trial.mean_strides.is_some() != (trial.state.has_gait() && walks.effect.is_part_of_result()) {
         return Err("its mean_strides contradict the setting simulated_walks of the study".to_owned());
