@@ -11,8 +11,8 @@ use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{
-    CancelToken, Gait, GaitProblem, GaitResults, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
-    TunedBounds, WarmStart, solve,
+    CancelToken, Gait, GaitProblem, GaitResults, GaitSettings, LocalOptimumChoice, Mesh, SolveOptions, SolveOutcome,
+    SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
 use std::sync::LazyLock;
 
@@ -253,9 +253,8 @@ fn cold_start_without_retry_tries_its_guesses_only() {
 #[test]
 fn numbered_local_optimum_is_the_outcome_of_a_cold_start() {
     let with = |choice| SolveOptions { initial_guesses: 4, local_optimum_choice: choice, ..SolveOptions::default() };
-    let solved = |warm: Option<&WarmStart>, choice| {
-        solve(&problem(""), warm, &with(choice), &mut |_| {}, &CancelToken::new())
-    };
+    let solved =
+        |warm: Option<&WarmStart>, choice| solve(&problem(""), warm, &with(choice), &mut |_| {}, &CancelToken::new());
     let number = |outcome: &SolveOutcome| {
         outcome.report.solver_runs.iter().find(|run| run.chosen).and_then(|run| run.local_optimum).unwrap()
     };

@@ -37,26 +37,29 @@ pub(super) fn shown(
 impl ShownLocalOptimum {
     fn new(trial: TrialId, found: &FoundLocalOptimum, reference: &ReferenceGait) -> Result<Self, ModelError> {
         let FoundLocalOptimum { number, is_result, objective, gait, .. } = found;
-        let strides = Spatiotemporal::of(gait)?;
         let address = |figure: &Figure| {
             let which = if *is_result { String::new() } else { format!("?local_optimum={number}") };
             format!("/api/v1/trials/{trial}/figures/{}.svg{which}", figure.name)
         };
         let text = |name: &str, value: String| (name.to_owned(), value);
         let mut values = vec![text("Objective", format::decimal(Some(*objective)))];
-        for compared in compare_with_references(gait, reference)? {
-            let name = format!("Gait RMSE, rad, against {}", compared.reference_gait);
-            values.push((name, format::decimal(Some(compared.gait_rmse_rad))));
+        // Values of a malformed gait would be false.
+        if gait.validate().is_ok() {
+            for compared in compare_with_references(gait, reference)? {
+                let name = format!("Gait RMSE, rad, against {}", compared.reference_gait);
+                values.push((name, format::decimal(Some(compared.gait_rmse_rad))));
+            }
+            let strides = Spatiotemporal::of(gait)?;
+            values.extend([
+                text("Walking speed, m/s", format!("{:.2}", strides.speed_m_s)),
+                text("Stride length, m", format!("{:.3}", strides.stride_length_m)),
+                text("Double support, % of the stride", format!("{:.1}", strides.double_support_percent)),
+                text(
+                    "Step length, left / right",
+                    format!("{:.2}", strides.left.step_length_m / strides.right.step_length_m),
+                ),
+            ]);
         }
-        values.extend([
-            text("Walking speed, m/s", format!("{:.2}", strides.speed_m_s)),
-            text("Stride length, m", format!("{:.3}", strides.stride_length_m)),
-            text("Double support, % of the stride", format!("{:.1}", strides.double_support_percent)),
-            text(
-                "Step length, left / right",
-                format!("{:.2}", strides.left.step_length_m / strides.right.step_length_m),
-            ),
-        ]);
         Ok(Self {
             number: *number,
             is_result: *is_result,
