@@ -382,8 +382,35 @@ create table gaits (
     created_at      text not null
 ) strict;
 
+create index gaits_by_sha256 on gaits (gait_sha256);
 create trigger gaits_no_update before update on gaits
 begin select raise(abort, 'gaits are never changed'); end;
+
+-- The other local optima that a cold start reached, with a gait of each: candidates for the root gait of another study. Archives
+-- do not have them. They are deleted with the gait of the trial.
+create table other_local_optima (
+    trial_id        text not null references trials (id),
+    -- In the order in which the initial guesses reached them, from 1. The gait of the trial has the missing number.
+    number          integer not null constraint other_local_optima_number check (number >= 1),
+    objective       real not null,
+    gait_rmse_rad   real not null,
+    gait            blob not null,
+    warm_start      blob not null,
+    gait_sha256     text not null,
+    primary key (trial_id, number)
+) strict;
+
+create trigger other_local_optima_no_update before update on other_local_optima
+begin select raise(abort, 'gaits are never changed'); end;
+
+-- The inputs of the solves of this service, so that a trial with the same input takes the result. Archives do not have them,
+-- so the result of a trial never comes from an imported one.
+create table solve_inputs (
+    -- SHA-256 of the version of the program and of the input, in the format of `problem.json`.
+    sha256   text primary key not null constraint solve_inputs_sha256 check (length(sha256) = 64),
+    -- The trial with the result.
+    trial_id text not null references trials (id)
+) strict, without rowid;
 
 -- Certificates of gaits: one for each version of the certificate.
 create table certificates (

@@ -27,7 +27,7 @@ pub use cold_start_guesses::{CostStrategy, GuessTiming, InitialGuess, MuscleRout
 pub use error::SolveError;
 pub use gait_results::GaitResults;
 use local_optima::number_local_optima;
-use local_optimum_choice::choose;
+use local_optimum_choice::{after_warm_start, choose, refuse_missing};
 use multi_start::{try_guesses, try_multi_start};
 pub use options::{LocalOptimumChoice, SolveOptions};
 use phases::SolveContext;
@@ -75,7 +75,12 @@ pub fn solve(
         tried.extend(try_multi_start(&context, observer)?);
     }
     number_local_optima(&mut tried);
-    let chosen = choose(&tried, options.local_optimum_choice);
+    let choice = match warm_start {
+        None => options.local_optimum_choice,
+        Some(_) => after_warm_start(options.local_optimum_choice),
+    };
+    refuse_missing(&tried, choice)?;
+    let chosen = choose(&tried, choice);
     let started_from = match (warm_start, chosen) {
         (None, _) => StartedFrom::Cold,
         (Some(_), 0) => StartedFrom::Warm,
@@ -124,6 +129,7 @@ pub fn solve_from_guesses(
     let context = SolveContext { problem, program: &program, options, cancel, started: Instant::now() };
     let mut tried = try_guesses(&context, guesses, 0, observer)?;
     number_local_optima(&mut tried);
+    refuse_missing(&tried, options.local_optimum_choice)?;
     let chosen = choose(&tried, options.local_optimum_choice);
     finish(&context, tried, chosen, StartedFrom::Cold)
 }

@@ -11,8 +11,8 @@ use gait_optimizer::gait::progress_error_m;
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::solve::StartedFrom;
 use gait_optimizer::{
-    CancelToken, Gait, GaitProblem, GaitResults, GaitSettings, Mesh, SolveOptions, SolveOutcome, SolveStatus, Subject,
-    TunedBounds, WarmStart, solve,
+    CancelToken, Gait, GaitProblem, GaitResults, GaitSettings, LocalOptimumChoice, Mesh, SolveOptions, SolveOutcome,
+    SolveStatus, Subject, TunedBounds, WarmStart, solve,
 };
 use std::sync::LazyLock;
 
@@ -248,6 +248,32 @@ fn cold_start_without_retry_tries_its_guesses_only() {
     let outcome = solve(&problem(""), None, &options, &mut |_| {}, &CancelToken::new()).unwrap();
     assert_ne!(outcome.report.status, SolveStatus::Converged);
     assert_eq!(outcome.report.solver_runs.len(), options.initial_guesses);
+}
+
+#[test]
+fn numbered_local_optimum_is_the_outcome_of_a_cold_start() {
+    let with = |choice| SolveOptions { initial_guesses: 4, local_optimum_choice: choice, ..SolveOptions::default() };
+    let solved =
+        |warm: Option<&WarmStart>, choice| solve(&problem(""), warm, &with(choice), &mut |_| {}, &CancelToken::new());
+    let number = |outcome: &SolveOutcome| {
+        outcome.report.solver_runs.iter().find(|run| run.chosen).and_then(|run| run.local_optimum).unwrap()
+    };
+    let lowest = solved(None, LocalOptimumChoice::LowestObjective).unwrap();
+    let other = lowest.other_local_optima.first().expect("several local optima");
+    let numbered = |number| LocalOptimumChoice::Numbered { number };
+    let second = solved(None, numbered(other.local_optimum)).unwrap();
+    assert_eq!(number(&second), other.local_optimum);
+    // Tightening of bounds between nodes may change the objective a little.
+    let difference = (second.report.objective - other.objective).abs();
+    assert!(difference < 1e-2 * other.objective && second.report.objective > lowest.report.objective, "{difference}");
+    assert!(second.other_local_optima.iter().any(|found| found.local_optimum == number(&lowest)));
+
+    let reached = 1 + lowest.other_local_optima.len();
+    let missing = solved(None, numbered(reached + 1)).unwrap_err().to_string();
+    assert!(missing.contains(&format!("local optima 1 to {reached}, but not number {}", reached + 1)), "{missing}");
+    // The number belongs to cold starts.
+    let warm = solved(Some(&second.warm_start), numbered(reached + 1)).unwrap();
+    assert_eq!(warm.report.started_from, StartedFrom::Warm);
 }
 
 #[test]

@@ -7,8 +7,8 @@ use gait_optimizer::body::{Axis, FootPoint, Side};
 use gait_optimizer::gait::{ContactRowName, MuscleTrajectory};
 use gait_optimizer::solve::{SolvePhase, StartedFrom};
 use gait_optimizer::{
-    CancelToken, DomainTrajectory, Gait, IterationRecord, LinearAlgebra, Margins, SolveOutcome, SolveReport,
-    SolveStatus, TunedBounds, UnchangedBound, Violation, WarmPoint, WarmStart,
+    CancelToken, DomainTrajectory, Gait, IterationRecord, LinearAlgebra, Margins, OtherLocalOptimum, SolveOutcome,
+    SolveReport, SolveStatus, TunedBounds, UnchangedBound, Violation, WarmPoint, WarmStart,
 };
 use gaitwright_service::workers::{Assignment, Evaluate};
 use gaitwright_store::TrialId;
@@ -36,6 +36,8 @@ pub struct Analytic {
     pub cold_after_warm: Vec<u32>,
     /// Whether reports state for which bounds a gait is unchanged: every value of the bounds that this solver ignores.
     pub states_unchanged_bounds: bool,
+    /// Number of other local optima that a converged cold start reaches.
+    pub other_local_optima: usize,
     /// Number of started solves.
     pub begun: AtomicU32,
     /// Which solve made each iteration, in order: by the trial of its attempt.
@@ -105,8 +107,26 @@ impl Evaluate for Analytic {
         if self.states_unchanged_bounds && status == SolveStatus::Converged {
             outcome.report.unchanged_bounds = unchanged_bounds(a);
         }
+        if outcome.report.status == SolveStatus::Converged && assignment.warm_start.is_none() {
+            outcome.other_local_optima = other_local_optima(assignment, &outcome, self.other_local_optima);
+        }
         Ok(outcome)
     }
+}
+
+/// Local optima with the numbers after that of the outcome.
+fn other_local_optima(assignment: &Assignment, outcome: &SolveOutcome, most: usize) -> Vec<OtherLocalOptimum> {
+    let other = |number: usize| {
+        let gait_rmse_rad = outcome.report.gait_rmse_rad + 0.1 * number as f64;
+        OtherLocalOptimum {
+            local_optimum: number,
+            objective: outcome.report.objective + 0.1,
+            gait_rmse_rad,
+            gait: gait(assignment, gait_rmse_rad),
+            warm_start: outcome.warm_start.clone(),
+        }
+    };
+    (2..most + 2).map(other).collect()
 }
 
 fn unchanged_bounds(action: [f64; TunedBounds::COUNT]) -> Vec<UnchangedBound> {

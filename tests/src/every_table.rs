@@ -36,7 +36,8 @@ async fn change_and_undo(service: &Service, study: StudyId, content: &Value) {
 
 /// Writes a record with a row in every table.
 pub async fn fill(database: &Path) {
-    let service = Service::start(database, Analytic::default(), 1).await;
+    let solver = Analytic { other_local_optima: 1, ..Analytic::default() };
+    let service = Service::start(database, solver, 1).await;
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;
     service.wait_for(study, &[StudyState::Waiting]).await;
     let pair = service.post(&format!("/api/v1/studies/{study}/blind-pairs/next"), &json!({})).await.json();

@@ -75,7 +75,7 @@ async fn prefetched_solve_gives_way_within_one_iteration() {
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
 
-    let wanted = service.study(|new| new.number_of_trials = 1).await;
+    let wanted = service.study(|new| (new.number_of_trials, new.seed) = (1, 9)).await;
     service.wait_for(wanted, &[StudyState::Finished]).await;
     let wanted = service.trials(wanted).await[0].id;
     let made = made.lock().unwrap().clone();

@@ -178,7 +178,7 @@ async fn evidence_tables_are_append_only_for_other_programs() {
 const BY_TRIGGER: &str = "1811";
 
 /// Tables whose rows may be updated. Other triggers protect the plan of a study, and the proposal and result of a trial.
-const UPDATED: [&str; 16] = [
+const UPDATED: [&str; 17] = [
     "_sqlx_migrations",
     "checksums",
     "clock",
@@ -189,6 +189,7 @@ const UPDATED: [&str; 16] = [
     "sign_in_failures",
     "sign_in_links",
     "sign_in_sources",
+    "solve_inputs",
     "solve_jobs",
     "studies",
     "subjects",
@@ -197,9 +198,10 @@ const UPDATED: [&str; 16] = [
     "users",
 ];
 
-/// Tables whose rows may be deleted: gaits only by `prune`, which needs no update.
+/// Tables whose rows may be deleted: gaits and their local optima only by `prune`, which needs no update.
 fn may_be_deleted(table: &str) -> bool {
-    table == "gaits" || UPDATED.contains(&table) && !["tokens", "trials", "users"].contains(&table)
+    ["gaits", "other_local_optima"].contains(&table)
+        || UPDATED.contains(&table) && !["tokens", "trials", "users"].contains(&table)
 }
 
 #[tokio::test]

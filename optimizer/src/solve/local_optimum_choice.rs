@@ -1,5 +1,6 @@
 //! Which of several local optima is the outcome of a solve.
 
+use super::error::SolveError;
 use super::options::LocalOptimumChoice;
 use super::solve_report::SolveStatus;
 use super::solver_runs::{Candidate, FinishedRun};
@@ -29,8 +30,31 @@ pub(super) fn choose(tried: &[FinishedRun], choice: LocalOptimumChoice) -> usize
     };
     match choice {
         LocalOptimumChoice::LowestObjective => lowest,
+        LocalOptimumChoice::Numbered { number } => {
+            let local_optimum = |(_, t): &(usize, &FinishedRun)| t.run.local_optimum == Some(number);
+            converged().find(local_optimum).map_or(lowest, |(index, _)| index)
+        }
         LocalOptimumChoice::NearestToReference { within_percent } => {
             least(&|c| c.rmse, objective + 0.01 * within_percent * objective.abs()).map_or(lowest, |(index, _)| index)
         }
+    }
+}
+
+/// The choice of a solve with a warm start: numbers belong to cold starts.
+pub(super) fn after_warm_start(choice: LocalOptimumChoice) -> LocalOptimumChoice {
+    match choice {
+        LocalOptimumChoice::Numbered { .. } => LocalOptimumChoice::LowestObjective,
+        other => other,
+    }
+}
+
+/// Refuses runs that reached gaits, but not the local optimum that was asked for.
+pub(super) fn refuse_missing(tried: &[FinishedRun], choice: LocalOptimumChoice) -> Result<(), SolveError> {
+    let LocalOptimumChoice::Numbered { number } = choice else { return Ok(()) };
+    let is_cancelled = tried.iter().any(|t| t.candidate.status == SolveStatus::Cancelled);
+    let reached = tried.iter().filter_map(|t| t.run.local_optimum).max();
+    match reached {
+        Some(reached) if number > reached && !is_cancelled => Err(SolveError::NoLocalOptimum { number, reached }),
+        _ => Ok(()),
     }
 }

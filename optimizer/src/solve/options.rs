@@ -83,10 +83,16 @@ pub enum LocalOptimumChoice {
         /// Largest excess over the lowest objective, per cent.
         within_percent: f64,
     },
+    /// The gait of one local optimum. A cold start in place of a warm start that found no gait chooses the lowest objective
+    /// instead, because its local optima are others.
+    Numbered {
+        /// Number of the local optimum, in the order in which the initial guesses of the cold start reached them, from 1.
+        number: usize,
+    },
 }
 
 impl LocalOptimumChoice {
-    /// Checks the percentage.
+    /// Checks percentage and number.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] with the field.
@@ -95,6 +101,10 @@ impl LocalOptimumChoice {
             Self::LowestObjective => Ok(()),
             Self::NearestToReference { within_percent } => {
                 ModelError::check_range("local_optimum_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
+            }
+            Self::Numbered { number } => {
+                let most = InitialGuess::MOST as f64;
+                ModelError::check_range("local_optimum_choice.number", *number as f64, 1.0, most).map(|_| ())
             }
         }
     }

@@ -100,7 +100,8 @@ const SOLVE_OPTIONS: [Described; 8] = [
         "SolveOptions",
         "local_optimum_choice",
         "Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the lowest \
-         Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.",
+         Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent, or `numbered`, the one with \
+         this number among those that the cold start reached.",
     ),
     (
         "SolveOptions",

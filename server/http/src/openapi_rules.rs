@@ -245,25 +245,46 @@ fn widest_durations() -> GaitSettings {
     settings
 }
 
-/// The schema of the options of a solve. The choice of a gait is a word, or an object with a percentage.
+/// The schema of the options of a solve. The choice of a gait is a word, or an object with a percentage or a number.
 fn solve_options(missed: &mut Vec<String>) -> Value {
     let of = |options: SolveOptions| settings(options, |s: &SolveOptions| s.validate().err().map(Error::from));
     let mut schema = of(SolveOptions::default());
-    let nearest = LocalOptimumChoice::NearestToReference { within_percent: 0.0 };
-    let mut object =
-        of(SolveOptions { local_optimum_choice: nearest, ..SolveOptions::default() })["properties"]["local_optimum_choice"].take();
-    for (place, text) in [
-        ("/properties/nearest_to_reference", "Takes the local optimum with the lowest Gait RMSE."),
-        ("/properties/nearest_to_reference/properties/within_percent", "Largest excess over the lowest objective, %."),
-    ] {
-        match object.pointer_mut(place) {
-            Some(part) => part["description"] = json!(text),
-            None => missed.push(format!("SolveOptions.local_optimum_choice{place}")),
-        }
-    }
     let word = json!({ "type": "string", "enum": [LocalOptimumChoice::LowestObjective] });
+    let mut choices = vec![word];
+    for (choice, described) in [
+        (
+            LocalOptimumChoice::NearestToReference { within_percent: 0.0 },
+            [
+                ("/properties/nearest_to_reference", "Takes the local optimum with the lowest Gait RMSE."),
+                (
+                    "/properties/nearest_to_reference/properties/within_percent",
+                    "Largest excess over the lowest objective, %.",
+                ),
+            ],
+        ),
+        (
+            LocalOptimumChoice::Numbered { number: 1 },
+            [
+                ("/properties/numbered", "Takes the local optimum with this number."),
+                (
+                    "/properties/numbered/properties/number",
+                    "Number of the local optimum, in the order in which the initial guesses reached them, from 1.",
+                ),
+            ],
+        ),
+    ] {
+        let options = SolveOptions { local_optimum_choice: choice, ..SolveOptions::default() };
+        let mut object = of(options)["properties"]["local_optimum_choice"].take();
+        for (place, text) in described {
+            match object.pointer_mut(place) {
+                Some(part) => part["description"] = json!(text),
+                None => missed.push(format!("SolveOptions.local_optimum_choice{place}")),
+            }
+        }
+        choices.push(object);
+    }
     match schema.pointer_mut("/properties/local_optimum_choice") {
-        Some(choice) => *choice = json!({ "oneOf": [word, object] }),
+        Some(choice) => *choice = json!({ "oneOf": choices }),
         None => missed.push("SolveOptions.local_optimum_choice".to_owned()),
     }
     schema["properties"]["solver"] = openapi_solver_settings::schema();

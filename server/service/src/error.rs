@@ -254,7 +254,7 @@ impl From<SolveError> for Error {
     fn from(error: SolveError) -> Self {
         match error {
             SolveError::Model(error) => error.into(),
-            SolveError::WarmStartShape { .. } => Self::Conflict(error.to_string()),
+            SolveError::WarmStartShape { .. } | SolveError::NoLocalOptimum { .. } => Self::Conflict(error.to_string()),
             SolveError::Solver(_) => Self::Internal(error.to_string()),
         }
     }

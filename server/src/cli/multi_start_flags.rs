@@ -19,6 +19,10 @@ pub(super) struct MultiStartFlags {
     /// RMSE (default: the gait with the lowest objective).
     #[arg(long, value_name = "PERCENT", value_parser = number, allow_negative_numbers = true)]
     nearest_within: Option<f64>,
+    /// Choose the gait of this local optimum: `solve` numbers them from 1, in the order in which the initial guesses of the cold
+    /// start reached them.
+    #[arg(long, value_name = "NUMBER", value_parser = initial_guesses, allow_negative_numbers = true, conflicts_with = "nearest_within")]
+    local_optimum: Option<usize>,
 }
 
 impl MultiStartFlags {
@@ -28,6 +32,9 @@ impl MultiStartFlags {
         if let Some(within_percent) = self.nearest_within {
             ModelError::check_range("--nearest-within", within_percent, 0.0, 100.0)?;
             options.local_optimum_choice = LocalOptimumChoice::NearestToReference { within_percent };
+        }
+        if let Some(number) = self.local_optimum {
+            options.local_optimum_choice = LocalOptimumChoice::Numbered { number };
         }
         options.validate()?;
         Ok(options)

@@ -20,6 +20,22 @@ pub async fn find(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Cer
         .transpose()
 }
 
+/// The certificate in the current format of any trial with the same gait as this one, bit for bit.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn of_same_gait(db: &mut Connection, trial: TrialId) -> StoreResult<Option<Certificate>> {
+    let sql = "select c.document from gaits own join gaits g on g.gait_sha256 = own.gait_sha256 \
+               join certificates c on c.trial_id = g.trial_id and c.format_version = ?2 where own.trial_id = ?1 limit 1";
+    sqlx::query(sql)
+        .bind(trial)
+        .bind(certificate::FORMAT_VERSION)
+        .fetch_optional(db)
+        .await?
+        .map(|row| json_columns::from_text("certificate", row.try_get("document")?))
+        .transpose()
+}
+
 /// Whether the certificate of a trial's gait passed, if there is one.
 ///
 /// # Errors

@@ -25,6 +25,14 @@ pub(super) struct OtherOverlaid<T> {
     other: Option<Named<T>>,
 }
 
+/// What a figure of a trial shows.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ShownGait {
+    other: Option<Named<TrialId>>,
+    local_optimum: Option<u32>,
+}
+
 /// Download a figure of a study
 #[utoipa::path(
     get,
@@ -53,7 +61,8 @@ pub(super) async fn of_study(
 
 /// Download a figure of a trial
 ///
-/// While the solve is running, shows its progress. With another trial, shows the joint angles of both.
+/// While the solve is running, shows its progress. With another trial, shows the joint angles of both. With a local optimum,
+/// shows the gait of that one.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",
@@ -62,7 +71,8 @@ pub(super) async fn of_study(
     params(
         ("id" = TrialId, Path, description = "Identifier of the trial"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("other" = Option<TrialId>, Query, description = "Identifier of a converged trial of the same study for comparison")
+        ("other" = Option<TrialId>, Query, description = "Identifier of a converged trial of the same study for comparison"),
+        ("local_optimum" = Option<u32>, Query, description = "Number of another local optimum of the trial. Without `other`")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -72,12 +82,14 @@ pub(super) async fn of_trial(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(OtherOverlaid { other }): Params<OtherOverlaid<TrialId>>,
+    Params(ShownGait { other, local_optimum }): Params<ShownGait>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
-    let figures = match other {
-        None => trial::of_trial(&mut app, id).await?,
-        Some(other) => trial::of_pair(&mut app, id, other).await?,
+    let figures = match (other, local_optimum) {
+        (None, None) => trial::of_trial(&mut app, id).await?,
+        (None, Some(number)) => trial::of_local_optimum(&mut app, id, number).await?,
+        (Some(other), None) => trial::of_pair(&mut app, id, other).await?,
+        (Some(_), Some(number)) => return Err(Error::invalid("local_optimum", number, "absent beside other").into()),
     };
     response(&mut app, figures, file).await
 }

@@ -3,6 +3,7 @@
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::csv_response::csv_file;
+use crate::extractors::Params;
 use crate::problem_details::Refusal;
 use crate::resources::document_schemas;
 use crate::visible::Visible;
@@ -12,17 +13,28 @@ use axum::response::{IntoResponse, Response};
 use gaitwright_charts::gait_table::gait_csv;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
-use gaitwright_store::{StoreError, TrialId, gaits, trials};
+use gaitwright_store::{StoreError, TrialId, gaits, other_local_optima, trials};
+use serde::Deserialize;
+
+/// Which gait of a trial.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GaitQuery {
+    local_optimum: Option<u32>,
+}
 
 /// Get the gait of a trial
 ///
-/// The trajectory in the format of the optimiser.
+/// The trajectory in the format of the optimiser. A gait of another local optimum satisfies the bounds at the nodes.
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait",
     operation_id = "get_gait",
     tag = "trials",
-    params(("id" = TrialId, Path, description = "Identifier of the trial")),
+    params(
+        ("id" = TrialId, Path, description = "Identifier of the trial"),
+        ("local_optimum" = Option<u32>, Query, description = "Number of another local optimum of the trial")
+    ),
     responses((status = 200, description = "Gait", body = document_schemas::GaitDocument), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
@@ -30,8 +42,14 @@ pub(super) async fn get(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
+    Params(GaitQuery { local_optimum }): Params<GaitQuery>,
 ) -> Result<Response, Refusal> {
-    let gait = gaits::get(&mut *app.read().await?, id).await?;
+    let mut reader = app.read().await?;
+    let gait = match local_optimum {
+        None => gaits::get(&mut reader, id).await?,
+        Some(number) => other_local_optima::get(&mut reader, id, number).await?.gait,
+    };
+    drop(reader);
     let text = app.compute(move |pool| gait.text(pool)).await??;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }

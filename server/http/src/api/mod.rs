@@ -22,6 +22,7 @@ mod jobs;
 mod lab_script_trials;
 mod lab_sessions;
 mod limit_cycles;
+mod local_optima;
 mod measurement_files;
 mod members;
 mod preferences;
@@ -93,6 +94,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(trials::retry))
         .routes(routes!(trials::iterations))
         .routes(routes!(trials::attempts))
+        .routes(routes!(local_optima::of_trial))
         .routes(routes!(gaits::get))
         .routes(routes!(gaits::get_csv))
         .routes(routes!(exports::problem))

@@ -7,7 +7,7 @@ use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::preference_answer;
-use gaitwright_store::{TrialId, gaits, reference_gaits, studies, trials};
+use gaitwright_store::{TrialId, gaits, other_local_optima, reference_gaits, studies, trials};
 
 /// Every figure of the page of a gait; while its solve runs, the solver progress.
 ///
@@ -33,6 +33,19 @@ pub(crate) async fn of_trial(app: &mut AppState, id: TrialId) -> Result<Vec<Figu
         }
         figures.extend(gait_charts::solve(&iterations));
         Ok(figures)
+    };
+    app.compute(draw).await?
+}
+
+/// The figures of another local optimum of a trial.
+///
+/// # Errors
+/// [`Error::NotFound`]; errors of the database.
+pub(crate) async fn of_local_optimum(app: &mut AppState, id: TrialId, number: u32) -> Result<Vec<Figure>, Error> {
+    let found = other_local_optima::get(&mut *app.read().await?, id, number).await?;
+    let draw = move |pool: &OnPool| {
+        let gait = found.gait.unpack(pool)?;
+        Ok(vec![gait_charts::tiles(stick_figures(&gait)?), gait_charts::animation(GaitWalker::new(&gait)?)])
     };
     app.compute(draw).await?
 }

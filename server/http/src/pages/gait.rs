@@ -4,6 +4,7 @@ use super::certificate::{self, CertificateJob};
 use super::explanation::{FeasibleRelaxation, NoGait};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
+use super::local_optima::{self as shown_local_optima, ShownLocalOptimum};
 use super::page_chart::{PageChart, shared_legend};
 use super::reached_bounds::{self, BoundUse};
 use super::sensitivities::SensitivityTable;
@@ -24,13 +25,14 @@ use gaitwright_service::access::{Answer, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
+use gaitwright_service::studies::local_optima;
 use gaitwright_service::studies::relaxed_trial::NoRelaxedTrial;
 use gaitwright_service::studies::reported_gait::ReportedGait;
 use gaitwright_service::studies::safety_reports::SafetyReports;
 use gaitwright_service::studies::sensitivities;
-use gaitwright_store::studies::Study;
+use gaitwright_store::studies::{Study, WarmStartFrom};
 use gaitwright_store::trials::Trial;
-use gaitwright_store::{TrialId, certificates, events, gaits, reference_gaits, studies, trials};
+use gaitwright_store::{StudyId, TrialId, certificates, events, gaits, reference_gaits, studies, trials};
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -71,6 +73,10 @@ struct GaitPage {
     peaks: Vec<JointPeaks>,
     /// Each bound with the value that the gait reaches.
     bounds: Vec<BoundUse>,
+    /// The gaits of the local optima, if there are several.
+    local_optima: Vec<ShownLocalOptimum>,
+    /// The study, if a study like it can start from another of these gaits.
+    root_study: Option<StudyId>,
     /// Why the trial has no gait.
     no_gait: Option<NoGait>,
     phases: [(&'static str, &'static str); 4],
@@ -149,11 +155,13 @@ pub(super) async fn get(
         ExplanationState::Made(made) => FeasibleRelaxation::all(&mut reader, &study, &trial, &made.explanation).await?,
         _ => Vec::new(),
     };
+    let local_optima = local_optima::of_trial(&mut reader, id).await?;
     let may_run = authorized.caller.may(Run::NEEDED);
     let reviews = authorized.caller.may(Answer::NEEDED);
     // Without sign-in the name is unknown.
     let reviewer = reviews.then(|| authorized.caller.user.map_or_else(String::new, |_| authorized.caller.name));
     drop(reader);
+    let root_study = is_root(&study, &trial).then_some(study.id);
     let has_gait = gait.is_some();
     let reference_name = reference.name.clone();
     let tried = trial.clone();
@@ -164,10 +172,12 @@ pub(super) async fn get(
         let well_formed = gait.as_ref().filter(|gait| with_gait && gait.validate().is_ok());
         let summary = well_formed.map(|gait| GaitSummary::new(gait, &reference)).transpose()?;
         let sensitivities = solution.map(|solution| SensitivityTable::new(solution, pool));
+        let local_optima = local_optima::unpacked(pool, local_optima)?;
+        let local_optima = shown_local_optima::shown(tried.id, &local_optima, &reference)?;
         let drawn = draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?;
-        Ok::<_, Error>((drawn, summary, sensitivities))
+        Ok::<_, Error>((drawn, summary, sensitivities, local_optima))
     };
-    let (drawn, summary, sensitivities) = app.compute(drawn).await.map_err(Error::from)??;
+    let (drawn, summary, sensitivities, local_optima) = app.compute(drawn).await.map_err(Error::from)??;
     page(&GaitPage {
         state: words(trial.state.as_str()),
         rmse: format::decimal(trial.gait_rmse_rad),
@@ -177,6 +187,8 @@ pub(super) async fn get(
         violation: format::optional_number(trial.max_violation),
         values: values(&trial),
         bounds: drawn.bounds,
+        local_optima,
+        root_study: root_study.filter(|_| may_run),
         no_gait: NoGait::new(&trial, explained, ways, &effort, last_event),
         from,
         reference: reference_name,
@@ -201,6 +213,11 @@ pub(super) async fn get(
         trial,
         study,
     })
+}
+
+/// Whether every solve of the study starts from the gait of this trial.
+fn is_root(study: &Study, trial: &Trial) -> bool {
+    study.plan.warm_start_from == WarmStartFrom::Root && trial.number == 1
 }
 
 /// A section of charts.

@@ -22,6 +22,7 @@ mod joint_peaks;
 mod lab_session;
 mod lab_sessions;
 mod lab_tablet;
+mod local_optima;
 mod measurement_files;
 mod measurement_forms;
 mod members;

@@ -23,6 +23,7 @@ pub(crate) mod imports;
 pub(crate) mod jobs;
 pub(crate) mod lab_sessions;
 pub(crate) mod limit_cycles;
+pub(crate) mod local_optima;
 pub(crate) mod measurement_files;
 pub(crate) mod members;
 pub(crate) mod reference_gaits;

@@ -84,8 +84,17 @@ pub async fn certificate(store: &mut Store, certification: Certification) -> Res
 /// # Errors
 /// As [`begin`] and [`certificate`].
 pub async fn run(store: &mut Store, actor: &Actor, trial: TrialId, certifier: &Arc<dyn Certify>) -> Result<(), Error> {
-    let Certification::Ahead(gait) = begin(&mut *store.read().await?, trial).await? else { return Ok(()) };
+    let mut reader = store.read().await?;
+    let Certification::Ahead(gait) = begin(&mut reader, trial).await? else { return Ok(()) };
+    let known = certificates::of_same_gait(&mut reader, trial).await?;
+    drop(reader);
+    // Unpacking checks the hash by which the certificate of the same gait was found.
     let gait = store.compute(move |pool| gait.unpack(pool)).await??;
+    if let Some(known) = known {
+        let mut writer = store.write().await?;
+        record(&mut writer, actor, trial, &known).await?;
+        return Ok(commit(writer).await?);
+    }
     let certifier = Arc::clone(certifier);
     let result = run_below_solves("certifier", move || certifier.certify(&gait))
         .map_err(|e| Error::Internal(format!("cannot start a thread for a certification: {e}")))?;

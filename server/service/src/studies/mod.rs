@@ -40,6 +40,7 @@ mod jobs_after_solves;
 pub mod lab;
 pub mod lab_script;
 pub mod lifecycle;
+pub mod local_optima;
 mod local_optimum_jump;
 pub mod membership;
 pub mod motions_reported_unsafe;

@@ -44,6 +44,15 @@ impl SolveInput {
     pub fn to_json(&self) -> Result<String, Error> {
         serde_json::to_string(self).map_err(|e| Error::Internal(e.to_string()))
     }
+
+    /// SHA-256 of the version of the program and of `problem.json`. Equal hashes mean equal outcomes.
+    ///
+    /// # Errors
+    /// As [`Self::to_json`].
+    pub fn sha256(&self) -> Result<String, Error> {
+        let json = self.to_json()?;
+        Ok(gaitwright_store::sha256(format!("{}\n{json}", env!("CARGO_PKG_VERSION")).as_bytes()))
+    }
 }
 
 /// A stored solve input, whose warm start is still compressed.

@@ -7,7 +7,7 @@ use super::snapshot::StudySnapshot;
 use crate::error::Error;
 use gaitwright_compute::OnPool;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::{Store, commit, gaits, now, studies};
+use gaitwright_store::{Store, commit, gaits, now, other_local_optima, studies};
 use serde_json::json;
 
 /// Deletes the trajectories of studies that ended more than `days` ago, except gaits that are or may be recommended.
@@ -27,6 +27,7 @@ pub async fn prune(store: &mut Store, days: u32) -> Result<u64, Error> {
         let kept = certified_best::worth_keeping(&mut writer, &ranking).await?;
         let count = gaits::drop_of_study(&mut writer, id, &kept).await?;
         if count > 0 {
+            other_local_optima::drop_without_gait(&mut writer, id).await?;
             let detail = json!({ "trajectories": count, "kept": kept });
             audit::append(&mut writer, &Actor::terminal(), "study.prune", &format!("study {id}"), &detail).await?;
             commit(writer).await?;

@@ -14,16 +14,19 @@ use gait_optimizer::execution::ExecutionReport;
 use gait_optimizer::{SolveOutcome, SolveStatus};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::gaits::PackedGait;
+use gaitwright_store::other_local_optima::{self, PackedLocalOptimum};
 use gaitwright_store::solve_jobs::Lease;
 use gaitwright_store::studies::SimulatedWalksEffect;
 use gaitwright_store::trials::{Label, TrialEnd, TrialState};
-use gaitwright_store::{Store, TrialId, attempts, commit, gaits, solve_jobs, studies, trials};
+use gaitwright_store::{Store, TrialId, attempts, commit, gaits, solve_inputs, solve_jobs, studies, trials};
 use std::time::Duration;
 
 /// How often a result is compared again because the study received an answer in the meantime.
 const TRIES: u32 = 20;
 /// The pause after the first attempt; it grows by this much after each.
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
+
+const EARLIER: &str = "The result is that of an earlier solve of the same problem.";
 
 /// What a worker and the service computed for a trial.
 #[derive(Debug)]
@@ -32,6 +35,12 @@ pub struct Computed<'a> {
     pub outcome: &'a SolveOutcome,
     /// Its gait, or the last iterate.
     pub gait: Option<&'a PackedGait>,
+    /// The other local optima of a converged cold start.
+    pub other_local_optima: &'a [PackedLocalOptimum],
+    /// The hash of the input of the solve; `None` if the record no longer has the input.
+    pub input_sha256: Option<&'a str>,
+    /// Whether the outcome is that of an earlier solve with the same input.
+    pub is_earlier: bool,
     /// The execution report, if the result of the trial depends on it.
     pub report: Option<&'a ExecutionReport>,
 }
@@ -45,7 +54,7 @@ pub async fn ended(
     store: &mut Store,
     lease: &Lease,
     worker: &str,
-    Computed { outcome, gait, report }: Computed<'_>,
+    Computed { outcome, gait, other_local_optima, input_sha256, is_earlier, report }: Computed<'_>,
 ) -> Result<bool, Error> {
     let Some(solved) = trial_transitions::label_of(outcome.report.status) else {
         return match outcome.report.status {
@@ -59,7 +68,7 @@ pub async fn ended(
         report: Some(outcome.report.clone()),
         mean_strides,
         violations: outcome.violations.clone(),
-        message: message_of(outcome),
+        message: String::new(),
     };
     for attempt in 0..TRIES {
         tokio::time::sleep(FIRST_PAUSE * attempt).await;
@@ -76,15 +85,14 @@ pub async fn ended(
         let label =
             if solved == Label::Converged { label_of_gait(&plan.simulated_walks, mean_strides) } else { solved };
         end.state = TrialState::from(label);
-        if let Some(fold) = snapshot
+        let fold = snapshot
             .trial(lease.trial)
-            .and_then(|trial| local_optimum_jump::in_words(&snapshot, trial, &outcome.report))
-        {
-            end.message = fold;
-        }
-        if let (Label::NotExecutable, Some(strides)) = (label, mean_strides) {
-            end.message = why_not_executable(&plan.simulated_walks, strides);
-        }
+            .and_then(|trial| local_optimum_jump::in_words(&snapshot, trial, &outcome.report));
+        let message = match (label, mean_strides) {
+            (Label::NotExecutable, Some(strides)) => why_not_executable(&plan.simulated_walks, strides),
+            _ => fold.unwrap_or_else(|| message_of(outcome)),
+        };
+        end.message = if is_earlier { format!("{message} {EARLIER}").trim_start().to_owned() } else { message };
         let answers = answers(store, &snapshot, lease.trial, &end).await?;
 
         let mut writer = store.write().await?;
@@ -101,6 +109,12 @@ pub async fn ended(
         trials::finish(&mut writer, lease.trial, &end).await?;
         if let Some(gait) = gait {
             gaits::insert(&mut writer, lease.trial, gait).await?;
+            for found in other_local_optima {
+                other_local_optima::insert(&mut writer, lease.trial, found).await?;
+            }
+            if let Some(sha256) = input_sha256 {
+                solve_inputs::put(&mut writer, sha256, lease.trial).await?;
+            }
         }
         if let Some(report) = report {
             let trial = trials::get(&mut writer, lease.trial).await?;

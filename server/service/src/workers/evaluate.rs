@@ -28,8 +28,7 @@ impl Evaluate for GaitSolver {
         observer: &mut dyn FnMut(&IterationRecord),
         cancel: &CancelToken,
     ) -> Result<SolveOutcome, String> {
-        let solved = solve(&assignment.problem, assignment.warm_start.as_ref(), &assignment.options, observer, cancel);
-        // The record does not keep gaits of other local optima. To get them, solve the trial's problem again.
-        solved.map(|outcome| SolveOutcome { other_local_optima: Vec::new(), ..outcome }).map_err(|e| e.to_string())
+        solve(&assignment.problem, assignment.warm_start.as_ref(), &assignment.options, observer, cancel)
+            .map_err(|e| e.to_string())
     }
 }

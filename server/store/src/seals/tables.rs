@@ -30,6 +30,7 @@ pub const TABLES: &[Sealed] = &[
     sealed("studies", &["id"]),
     sealed("trials", &["id"]),
     sealed("gaits", &["trial_id"]),
+    sealed("other_local_optima", &["trial_id", "number"]),
     sealed("attempts", &["trial_id", "attempt"]),
     sealed("certificates", &["trial_id", "format_version"]),
     sealed("explanation_requests", &["trial_id"]),
@@ -67,6 +68,7 @@ pub const TABLES: &[Sealed] = &[
 /// Tables with checksums: their rows change often, or only repeat other data.
 pub const CHECKED: &[Sealed] = &[
     sealed("events", &["seq"]),
+    sealed("solve_inputs", &["sha256"]),
     sealed("solve_jobs", &["id"]),
     Sealed { table: "idempotency_keys", key: &["actor", "key"], hex: true },
     sealed("sessions", &["hash"]),

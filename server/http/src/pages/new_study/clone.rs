@@ -38,8 +38,13 @@ impl NewStudyFields {
             least_mean_strides: plan.simulated_walks.least_mean_strides.to_string(),
             nearest_within_percent: match plan.solve_options.local_optimum_choice {
                 LocalOptimumChoice::NearestToReference { within_percent } => within_percent.to_string(),
-                LocalOptimumChoice::LowestObjective => String::new(),
+                LocalOptimumChoice::LowestObjective | LocalOptimumChoice::Numbered { .. } => String::new(),
             },
+            local_optimum: match plan.solve_options.local_optimum_choice {
+                LocalOptimumChoice::Numbered { number } => number.to_string(),
+                LocalOptimumChoice::LowestObjective | LocalOptimumChoice::NearestToReference { .. } => String::new(),
+            },
+            initial_guesses: plan.solve_options.initial_guesses.to_string(),
             space: space_of(plan),
             ..Self::default()
         }

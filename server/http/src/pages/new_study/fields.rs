@@ -61,6 +61,10 @@ pub(crate) struct NewStudyFields {
     pub(super) least_mean_strides: String,
     #[serde(default)]
     pub(super) nearest_within_percent: String,
+    #[serde(default)]
+    pub(super) initial_guesses: String,
+    #[serde(default)]
+    pub(super) local_optimum: String,
     /// Whether bounds were relaxed in a clone, so that the table of bounds has to be shown.
     #[serde(skip)]
     pub(super) relaxed: bool,
@@ -105,6 +109,8 @@ impl Default for NewStudyFields {
             gait_rmse_tolerance_rad: String::new(),
             least_mean_strides: String::new(),
             nearest_within_percent: String::new(),
+            initial_guesses: String::new(),
+            local_optimum: String::new(),
             relaxed: false,
             space: BTreeMap::new(),
         }
@@ -154,6 +160,7 @@ impl TypedForm for NewStudyFields {
             ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
             ("simulated_walks.least_mean_strides", "Minimum mean strides"),
             ("nearest_within_percent", "Objective tolerance, %"),
+            ("local_optimum", "Local optimum"),
         ]));
         labels
     }
@@ -195,6 +202,8 @@ impl TypedForm for NewStudyFields {
             "simulated_walks.gait_rmse_tolerance_rad" => self.gait_rmse_tolerance_rad.clear(),
             "simulated_walks.least_mean_strides" => self.least_mean_strides.clear(),
             "nearest_within_percent" => self.nearest_within_percent.clear(),
+            "initial_guesses" => self.initial_guesses.clear(),
+            "local_optimum" => self.local_optimum.clear(),
             _ => {
                 let bound = field.rsplit('_').next().unwrap_or_default();
                 if !TunedBounds::NAMES.contains(&bound) {

@@ -123,10 +123,13 @@ impl NewStudyPage {
                 gait_rmse_tolerance_rad,
                 least_mean_strides,
                 nearest_within_percent,
+                initial_guesses,
+                local_optimum,
                 ..
             } = fields.clone();
             let walks = [walks_effect, walks_number, gait_rmse_tolerance_rad, least_mean_strides];
-            ([learner, unchanged_limit, parallel_trials, seed, nearest_within_percent], walks)
+            let cold_starts = [nearest_within_percent, initial_guesses, local_optimum];
+            ([learner, unchanged_limit, parallel_trials, seed], cold_starts, walks)
         };
         fields(typed) != fields(&default) || typed.repeat_results.is_some() || typed.warm_start_from_root.is_some()
     }
@@ -158,6 +161,9 @@ pub(super) struct Preset {
     /// Bounds to relax in the clone, as `a5=0.03,a7=20`.
     #[serde(default)]
     relax: String,
+    /// The local optimum with which the study begins.
+    #[serde(default)]
+    local_optimum: Option<u32>,
 }
 
 /// `GET /studies/new`.
@@ -178,6 +184,10 @@ pub(super) async fn get(
     };
     if let Some(subject) = preset.subject {
         fields.subject = subject.to_string();
+    }
+    if let Some(number) = preset.local_optimum {
+        fields.local_optimum = number.to_string();
+        fields.nearest_within_percent.clear();
     }
     if !preset.relax.is_empty() {
         fields.relax(&preset.relax)?;

@@ -4,7 +4,7 @@ use super::clone::cloned;
 use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, learner};
 use super::tuned_and_fixed_bounds::SpaceEditor;
 use crate::refused_fields::{FormCheck, RefusedFields};
-use gait_optimizer::{LocalOptimumChoice, SolveOptions};
+use gait_optimizer::{InitialGuess, LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::seed;
@@ -113,7 +113,11 @@ fn study_of(
         base_bounds,
         answer_source: AnswerSource::from_str(&fields.answer_source)
             .map_err(|_| Error::invalid("answer_source", fields.answer_source.as_str(), "gait_rmse, people or both"))?,
-        solve_options: SolveOptions { local_optimum_choice: local_optimum_choice(fields)?, ..base.solve_options },
+        solve_options: SolveOptions {
+            initial_guesses: initial_guesses(fields)?,
+            local_optimum_choice: local_optimum_choice(fields)?,
+            ..base.solve_options
+        },
         learner: match learner(&fields.learner) {
             Some(chosen) => chosen,
             None if like.is_some() && fields.learner == KEPT => base.learner,
@@ -157,11 +161,30 @@ fn simulated_walks(fields: &NewStudyFields) -> Result<SimulatedWalks, Error> {
     })
 }
 
-/// `None` if only the lowest objective counts.
+/// What the field of a local optimum accepts.
+const LOCAL_OPTIMUM: &str = "a whole number from 1, or empty, and empty beside an objective tolerance";
+
+fn initial_guesses(fields: &NewStudyFields) -> Result<usize, Error> {
+    let field = "initial_guesses";
+    let allowed = format!("1 to {}, or empty", InitialGuess::MOST);
+    let number = optional(field, &fields.initial_guesses, &allowed)?.unwrap_or(SolveOptions::default().initial_guesses);
+    let is_allowed = (1..=InitialGuess::MOST).contains(&number);
+    is_allowed.then_some(number).ok_or_else(|| Error::invalid(field, fields.initial_guesses.as_str(), &allowed))
+}
+
+/// Without an entry, the lowest objective counts.
 fn local_optimum_choice(fields: &NewStudyFields) -> Result<LocalOptimumChoice, Error> {
     let field = "nearest_within_percent";
     let allowed = "0 to 100, or empty";
-    let Some(within_percent) = optional(field, &fields.nearest_within_percent, allowed)? else {
+    let within_percent = optional(field, &fields.nearest_within_percent, allowed)?;
+    if let Some(number) = optional("local_optimum", &fields.local_optimum, LOCAL_OPTIMUM)? {
+        let chosen = LocalOptimumChoice::Numbered { number };
+        if within_percent.is_some() || chosen.validate().is_err() {
+            return Err(Error::invalid("local_optimum", fields.local_optimum.as_str(), LOCAL_OPTIMUM));
+        }
+        return Ok(chosen);
+    }
+    let Some(within_percent) = within_percent else {
         return Ok(LocalOptimumChoice::LowestObjective);
     };
     let chosen = LocalOptimumChoice::NearestToReference { within_percent };

@@ -5,6 +5,7 @@ use super::super::requeued_trial;
 use super::super::simulated_walks::report_of_each_gait;
 use super::super::trial_jobs::run_cancellable;
 use super::super::trial_result::{self, Computed};
+use super::earlier_solves::EARLIER;
 use super::{HEARTBEATS_PER_LEASE, Scheduler};
 use crate::error::Error;
 use crate::supervise::Task;
@@ -13,6 +14,7 @@ use gait_optimizer::execution::{ExecutionReport, simulate};
 use gait_optimizer::{CancelToken, Gait, SolveStatus};
 use gaitwright_compute::OnPool;
 use gaitwright_compute::priority::SOLVER;
+use gaitwright_store::other_local_optima::PackedLocalOptimum;
 use gaitwright_store::solve_jobs::{self, Lease};
 use gaitwright_store::studies::SimulatedWalksEffect;
 use gaitwright_store::{TrialId, commit, events, gaits, now, studies, trials};
@@ -133,11 +135,13 @@ impl Scheduler {
             AssignmentResult::Broke(reason) => return self.broke(&lease, &reason).await,
         };
         let pack = move |pool: &OnPool| {
-            let packed = gaits::PackedGait::new(pool, &outcome, &iterations);
-            (outcome, packed)
+            let gait = gaits::PackedGait::new(pool, &outcome, &iterations);
+            let others = outcome.other_local_optima.iter().map(|found| PackedLocalOptimum::new(pool, found));
+            let others: Result<Vec<_>, _> = others.collect();
+            (outcome, gait, others)
         };
-        let (outcome, packed) = store.compute(pack).await?;
-        let packed = packed?;
+        let (outcome, packed, others) = store.compute(pack).await?;
+        let (packed, others) = (packed?, others?);
         if packed.is_none() && outcome.report.status == SolveStatus::Converged {
             let reason = "The solver returned a converged gait with numbers that are not finite.";
             return self.broke(&lease, reason).await;
@@ -155,7 +159,11 @@ impl Scheduler {
         } else {
             None
         };
-        let computed = Computed { outcome: &outcome, gait: packed.as_ref(), report: report.as_deref() };
+        let input_sha256 = self.input_sha256(lease.trial).await?;
+        let (gait, input_sha256) = (packed.as_ref(), input_sha256.as_deref());
+        let (is_earlier, report) = (worker == EARLIER, report.as_deref());
+        let computed =
+            Computed { outcome: &outcome, gait, other_local_optima: &others, input_sha256, is_earlier, report };
         let used = trial_result::ended(&mut store, &lease, worker, computed).await?;
         if used && is_gait && effect == SimulatedWalksEffect::Report {
             self.simulate(lease.trial, Some(report_of_each_gait(&plan)));

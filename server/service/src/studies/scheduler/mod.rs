@@ -3,6 +3,7 @@
 //! One task plans and dispatches jobs, one receives the messages of workers, one prefetches solves for studies that
 //! wait for an answer. Their decisions depend on the record alone, so the process may end at any instant.
 
+mod earlier_solves;
 mod leases;
 mod message_loop;
 mod planning_loop;

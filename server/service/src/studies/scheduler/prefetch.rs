@@ -48,6 +48,9 @@ impl Scheduler {
             drop(reader);
             let input = unpacking.compute(move |pool| input.unpack(pool)).await??;
             let assignment = assigned(attempt, new.number, input);
+            if self.earlier_solve(&assignment).await?.is_some() {
+                continue;
+            }
             let _hand_over = self.0.hand_over.lock().await;
             if self.busy().await? < self.0.engine.size()
                 && self.0.prefetches.begin(study.id, &assignment)

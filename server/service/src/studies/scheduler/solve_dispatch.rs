@@ -3,6 +3,7 @@
 use super::super::problem_file::{PackedInput, SolveInput};
 use super::super::requeued_trial;
 use super::Scheduler;
+use super::earlier_solves::EARLIER;
 use super::prefetched_solves::{PREPARED, Prepared};
 use crate::dispatch_error::DispatchError;
 use crate::error::Error;
@@ -45,6 +46,13 @@ impl Scheduler {
             }
         };
         let attempt = assignment.attempt;
+        if let Some(earlier) = self.earlier_solve(&assignment).await?
+            && let Some(result) = self.result_of(earlier).await?
+        {
+            self.started(attempt, EARLIER).await?;
+            self.record_in_background(attempt, EARLIER.to_owned(), result, Receipt::not_needed());
+            return Ok(());
+        }
         let hand_over = self.0.hand_over.lock().await;
         match self.0.prefetches.claim(&assignment) {
             Prepared::Nothing => {}
