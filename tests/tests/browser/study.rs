@@ -85,6 +85,8 @@ async fn browser_follows_a_running_solve() {
     let text = "document.querySelector('.running [data-text]')?.textContent ?? ''";
     let drawing = "document.querySelector('.running .chart .line')?.getAttribute('d') ?? ''";
     let (early, drawn) = (page.value(text).await, page.value(drawing).await);
+    // Folded away until somebody wants to see it.
+    assert_eq!(page.value("document.querySelector('.running svg.chart').checkVisibility()").await, "false");
     page.wait_until(&format!("({text}) !== {early:?} && ({drawing}) !== {drawn:?}")).await;
     page.wait_for("[data-part=state] .state.finished").await;
     assert_eq!(page.count(".running").await, 0);
@@ -105,6 +107,11 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
             .await
             .contains("An animation of the recommended gait appears here after the first converged trial")
     );
+    assert!(page.text("[data-part=state]").await.contains("The time left can be estimated after 3 more solves."));
+    // Progress and the place of the best gait lead; the solve that runs is one line.
+    page.wait_for(".running").await;
+    let (bottom, ..) = page.lowest("progress, .running p").await;
+    assert!(bottom <= 420.0, "{bottom}");
     // The first gait walks without a reload, and the better one after it.
     page.run("window.same = true").await;
     page.wait_for(".outcome fieldset:enabled [data-phase]").await;
@@ -118,15 +125,15 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     let (bottom, ..) = page.lowest(".outcome svg.gait-walker").await;
     assert!(bottom <= 800.0, "{bottom}");
     page.is_clean(&site.origin).await;
-    let told = async |trials: u32| {
-        let fresh = site.service.study(|new| new.number_of_trials = trials).await;
-        site.service.fetch(&format!("/studies/{fresh}")).await.text
-    };
-    let long = told(8).await;
-    assert!(long.contains("The time left can be estimated after 3 more solves."), "{long}");
+    // Before its first result a study is estimated from earlier ones.
+    let fresh = site.service.study(|new| new.number_of_trials = 8).await;
+    let page = site.service.fetch(&format!("/studies/{fresh}")).await.text;
+    assert!(page.contains(" left for 8 trials; half of the earlier solves here took less than "), "{page}");
     // An estimate that can never come is not announced.
-    let short = told(2).await;
-    assert!(!short.contains("can be estimated"), "{short}");
+    let site = Site::start(Analytic::slow(Duration::from_millis(400))).await;
+    let short = site.service.study(|new| new.number_of_trials = 2).await;
+    let page = site.service.fetch(&format!("/studies/{short}")).await.text;
+    assert!(!page.contains("can be estimated"), "{page}");
     browser.close().await;
 }
 
@@ -308,7 +315,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
     // Where Gait RMSE answers, it decides, and not the analysis beside it.
     let by_rmse = "[...document.querySelectorAll('#best tbody tr')].slice(1).every((row, i, all) => \
-        row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
+        row.cells[1].textContent === (Number(row.cells[3].textContent) > Number(document.querySelector('#best tr.best').cells[3].textContent) \
         ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
     assert_eq!(page.value(by_rmse).await, "true");
     let bars = "[...document.querySelectorAll('#main-effects rect')].map(bar => bar.width.baseVal.value)";
@@ -628,6 +635,27 @@ async fn browser_prints_the_recommended_gait_with_date_and_version() {
         assert_eq!(page.value(&shown(selector)).await, printed, "{selector}");
     }
     assert!(page.text("p.paper").await.contains(concat!("Gaitwright ", env!("CARGO_PKG_VERSION"))));
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_the_analysis_whole_on_a_phone_and_on_paper() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.number_of_trials = 12).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}/analysis"))).await;
+    page.resize(390, 844).await;
+    // Whether a gait is better is said beside its number, in sight without scrolling across.
+    let answer = "(() => { const cell = document.querySelector('#best tbody tr:last-child').cells[1]; \
+                   return /Gait RMSE/.test(cell.textContent) && cell.getBoundingClientRect().right <= innerWidth })()";
+    assert_eq!(page.value(answer).await, "true");
+    page.be_paper().await;
+    page.resize(718, 1000).await;
+    let cut = "[...document.querySelectorAll('.across')].filter(box => box.scrollWidth > box.clientWidth + 1).length";
+    assert_eq!(page.count(".across").await, 3, "two maps and every trial");
+    assert_eq!(page.value(cut).await, "0");
+    assert_eq!(page.beyond().await, "0");
     browser.close().await;
 }
 

@@ -1,6 +1,6 @@
 //! The page with the figures of a study, or of two.
 
-use super::page_chart::PageChart;
+use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
@@ -28,7 +28,8 @@ struct FiguresPage {
     other: Option<StudyId>,
     offered: Vec<Study>,
     sessions: Vec<(LabSessionId, u32)>,
-    sections: Vec<(FigureSection, Vec<PageChart>)>,
+    /// The sections with the legend that their charts share, and the charts.
+    sections: Vec<(FigureSection, Vec<(String, String)>, Vec<PageChart>)>,
 }
 
 impl FiguresPage {
@@ -68,8 +69,8 @@ pub(super) async fn get(
     let query = other.map_or_else(String::new, |other| format!("?other={other}"));
     let files = format!("/api/v1/studies/{id}/figures");
     let drawn = |section: FigureSection| {
-        let drawn = section.figures.iter().map(|figure| PageChart::of(figure, &files, &query)).collect();
-        (section, drawn)
+        let mut drawn: Vec<_> = section.figures.iter().map(|figure| PageChart::of(figure, &files, &query)).collect();
+        (section, shared_legend(&mut drawn), drawn)
     };
     page(&FiguresPage {
         study,

@@ -227,8 +227,6 @@ struct ChartSection {
     hint: String,
     /// The legend of all charts; empty if each has its own.
     legend: Vec<(String, String)>,
-    /// Whether the charts mark stance and swing.
-    has_stances: bool,
     charts: Vec<PageChart>,
 }
 
@@ -256,7 +254,6 @@ fn draw(
         ChartSection {
             id: group.id,
             heading: group.heading,
-            has_stances: group.marks_stances(),
             hint: group.hint,
             legend: shared_legend(&mut charts),
             charts,

@@ -159,6 +159,7 @@ impl TypedForm for NewStudyFields {
             ("simulated_walks.number", "Number of simulated walks on each kind of ground"),
             ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
             ("simulated_walks.least_mean_strides", "Minimum mean strides"),
+            ("initial_guesses", "Initial guesses"),
             ("nearest_within_percent", "Objective tolerance, %"),
             ("local_optimum", "Local optimum"),
         ]));
