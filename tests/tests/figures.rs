@@ -175,7 +175,7 @@ async fn chart_of_a_running_solve_remains_after_its_end() {
         tokio::time::sleep(std::time::Duration::from_millis(10)).await;
         drawings = linked(
             &service.fetch(&page).await.text,
-            "/solve-objective-violation-and-barrier-parameter-by-iteration.csv",
+            "/solve-violation-dual-infeasibility-barrier-parameter-and-objective.csv",
         );
     }
     let rows = async |address: &str| String::from_utf8(file(&service, address).await.1).unwrap().lines().count();
