@@ -28,8 +28,15 @@ struct FiguresPage {
     other: Option<StudyId>,
     offered: Vec<Study>,
     sessions: Vec<(LabSessionId, u32)>,
-    /// The sections with the legend that their charts share, and the charts.
-    sections: Vec<(FigureSection, Vec<(String, String)>, Vec<PageChart>)>,
+    sections: Vec<DrawnSection>,
+}
+
+/// A section as the page shows it.
+struct DrawnSection {
+    section: FigureSection,
+    /// The legend that the charts share; empty if each has its own.
+    legend: Vec<(String, String)>,
+    charts: Vec<PageChart>,
 }
 
 impl FiguresPage {
@@ -69,8 +76,8 @@ pub(super) async fn get(
     let query = other.map_or_else(String::new, |other| format!("?other={other}"));
     let files = format!("/api/v1/studies/{id}/figures");
     let drawn = |section: FigureSection| {
-        let mut drawn: Vec<_> = section.figures.iter().map(|figure| PageChart::of(figure, &files, &query)).collect();
-        (section, shared_legend(&mut drawn), drawn)
+        let mut charts: Vec<PageChart> = section.figures.iter().map(|f| PageChart::of(f, &files, &query)).collect();
+        DrawnSection { legend: shared_legend(&mut charts), charts, section }
     };
     page(&FiguresPage {
         study,
