@@ -59,13 +59,13 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     }
     for (page, least) in [
         (format!("/studies/{}", studies[0]), 1 + 1),
-        (format!("/studies/{}/compare?a={}&b={}", studies[0], gaits[0].id, gaits[1].id), 5),
+        (format!("/studies/{}/compare?a={}&b={}", studies[0], gaits[0].id, gaits[1].id), 7),
         (format!("/studies/compare?a={}&b={}", studies[0], studies[1]), 1),
-        (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 5 + 2 + 7),
+        (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 7 + 2 + 7),
         (format!("/trials/{}", gaits[0].id), 1 + 1 + 4 + 2 + 3 + 3 + 7 + 7 + 2 + 4 + 1),
         (format!("/lab-sessions/{session}"), 6 + 2),
         (format!("/studies/{}/analysis?x=a5&y=a6", studies[0]), 8 + 2 + 2 + 1),
-        (format!("/reference-gaits/{}", service.reference().await), 5),
+        (format!("/reference-gaits/{}", service.reference().await), 4),
     ] {
         let shown = service.fetch(&page).await;
         assert_eq!(shown.status, StatusCode::OK, "{}", shown.text);
@@ -135,8 +135,12 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
         let study = service.study(|new| (new.number_of_trials, new.reference_gait_id) = (2, Some(reference))).await;
         service.wait_for(study, &[StudyState::Finished]).await;
         let trial = service.trials(study).await.into_iter().find(|t| t.state == TrialState::Converged).unwrap().id;
-        // The page of a gait has one legend for the left and the right leg.
-        for (page, bands) in [(format!("/studies/{study}/figures"), 5), (format!("/trials/{trial}"), 2)] {
+        // All charts share one legend; the page of a gait and that of a reference gait have the left and the right leg in it.
+        for (page, bands) in [
+            (format!("/studies/{study}/figures"), 1),
+            (format!("/trials/{trial}"), 2),
+            (format!("/reference-gaits/{}", reference), 2),
+        ] {
             let page = service.fetch(&page).await.text;
             assert_eq!(page.contains("The band shows one standard deviation on either side of the mean."), band);
             assert_eq!(page.contains("has no standard deviation, so there is no band"), !band);
@@ -145,9 +149,10 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
         let ankle = linked(&service.fetch(&format!("/studies/{study}/figures")).await.text, "left-ankle.csv").remove(0);
         let (_, csv) = file(&service, &ankle).await;
         let csv = String::from_utf8(csv).unwrap();
+        // Where the left foot strikes, half a stride after the right foot.
         let at_half: Vec<f64> = csv
             .lines()
-            .filter_map(|line| line.strip_prefix("one standard deviation,50,"))
+            .filter_map(|line| line.strip_prefix("one standard deviation,0,"))
             .map(|cell| cell.parse().unwrap())
             .collect();
         assert_eq!(at_half.len(), if band { 2 } else { 0 }, "{csv}");

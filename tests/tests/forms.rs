@@ -385,7 +385,7 @@ async fn comparison_page_shows_both_gaits_and_keeps_the_input() {
     ] {
         assert!(page.text.contains(&holds), "{holds}");
     }
-    assert_eq!(page.text.matches("<svg class=\"chart\"").count(), 5, "the five human joint angles");
+    assert_eq!(page.text.matches("<svg class=\"chart\"").count(), 7, "torso and six joints");
     let unprocessable = StatusCode::UNPROCESSABLE_ENTITY;
     let nobody = format!("a={a}&b={b}&answer=b&source=clinician&author=+&note=both+limp&key={UNKNOWN}");
     let refused = service.post_text(&path, FORM, &nobody).await;

@@ -86,7 +86,7 @@ async fn imported_recording_becomes_the_reference_of_a_study() {
     assert!(list.find(">near</a>").unwrap() < list.find(">far</a>").unwrap());
     let page = service.fetch(&format!("/reference-gaits/{id}")).await.text;
     assert!(
-        page.contains("Right hip") && page.contains("</i>one standard deviation") && page.contains("<svg"),
+        page.contains("</i>right leg") && page.contains("</i>one standard deviation") && page.contains("<svg"),
         "{page}"
     );
     let audit = service.fetch("/api/v1/audit").await.text;

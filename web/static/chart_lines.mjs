@@ -105,7 +105,7 @@ export function valueAt(axis, place) {
  */
 export function nameOf(chart, key) {
   const colour = key.match(/c\d/)?.[0];
-  const legends = [chart.closest("figure"), chart.closest("section")?.querySelector(".legend.shared")];
+  const legends = [chart.closest("figure"), chart.closest(".charts")?.previousElementSibling];
   const keys = legends.flatMap((legend) => [...(legend?.querySelectorAll(`.key.${colour}:not(.band, .stance)`) ?? [])]);
   const dash = key.split(" ").at(-1);
   const alike = keys.find((element) => element.classList.contains(String(dash))) ?? keys[0];

@@ -75,6 +75,8 @@ const STANCE_ROW: f64 = 10.0;
 const MARK_GAP: f64 = 6.0;
 /// Width of a character of a name above the chart, at the largest text size.
 const NAME_CHARACTER: f64 = 16.0;
+/// What the bars above a chart are, for its legend.
+const STANCES: &str = "bar above: stance, then swing; dotted line: foot off";
 /// Smallest value on a logarithmic axis.
 const SMALLEST: f64 = 1e-16;
 
@@ -205,14 +207,16 @@ impl Chart {
         if self.log_y { value.max(SMALLEST).log10() } else { value }
     }
 
-    /// Class and label of each visible line, for a legend in HTML.
+    /// Class and label of each visible line and other mark, for a legend in HTML.
     pub fn legend(&self) -> Vec<(String, String)> {
         let seen = |s: &&Series| s.points.iter().any(|(x, y)| x.is_finite() && y.is_finite());
         let lines = self.series.iter().filter(seen);
         let lines = lines.map(|s| (format!("key c{} {}", s.colour % 10, s.stroke.class()), s.label.clone()));
         let bands = self.bands.iter().map(|b| (format!("key c{} band", b.colour % 10), b.label.clone()));
         let marks = self.marks.iter().zip(1..).map(|((_, name), n)| ("key begins".to_owned(), format!("{n} {name}")));
-        lines.chain(bands).chain(marks).collect()
+        let has_stances = self.cycles.iter().any(|cycle| cycle.colour.is_some() && cycle.toe_off_percent.is_some());
+        let stances = has_stances.then(|| ("key stance".to_owned(), STANCES.to_owned()));
+        lines.chain(bands).chain(marks).chain(stances).collect()
     }
 
     fn draw(&self, svg: &mut String, x: &ChartAxis, y: &ChartAxis, with_links: bool) -> std::fmt::Result {

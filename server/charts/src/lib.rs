@@ -19,7 +19,6 @@ mod heat_map;
 mod parallel;
 #[cfg(feature = "png")]
 mod png;
-mod reference_band;
 mod series;
 mod simplified;
 mod sparkline;
@@ -31,12 +30,11 @@ mod walker;
 pub use axis::power_of_ten;
 pub use chart::{Chart, LegCycle, Span};
 pub use figure::{Drawing, Figure};
+pub use gait_charts::band_in_words;
 pub use heat_map::{HeatMap, Tile};
 pub use parallel::{Parallel, ParallelAxis, ParallelLine};
 #[cfg(feature = "png")]
 pub use png::PngError;
-pub(crate) use reference_band::over_reference_of_leg;
-pub use reference_band::{band_in_words, over_reference};
 pub use series::{Band, PointLink, Series, Stroke};
 pub use sparkline::sparkline;
 pub use standalone::STYLE_SHEET;

@@ -60,6 +60,8 @@ fn draw(svg: &mut String, title: &str, inside: &Inside, legend: &[(String, Strin
             write!(svg, "<circle class=\"dot {class}\" cx=\"13\" cy=\"8\" r=\"4\"/>")?;
         } else if class.ends_with("band") {
             write!(svg, "<rect class=\"{class}\" y=\"2\" width=\"26\" height=\"12\"/>")?;
+        } else if class == "stance" {
+            write!(svg, "<path class=\"stance\" d=\"M0 8H16\"/><path class=\"swing\" d=\"M16 8H26\"/>")?;
         } else if class == "begins" {
             write!(svg, "<path class=\"mark\" d=\"M13 0V16\"/>")?;
         } else {

@@ -71,6 +71,7 @@ fn stance_and_swing_of_each_leg_are_marked_on_its_own_cycle() {
     // The middle of the axis from 74 to 616.
     assert!(svg.contains("<path class=\"stance c0\" d=\"M74.0 38H345.0\"/>"), "{svg}");
     assert_eq!((svg.matches("class=\"swing").count(), svg.matches("class=\"toe_off").count()), (2, 2));
+    assert_eq!(chart.legend()[1].0, "key stance", "{:?}", chart.legend());
     chart.cycles = vec![cycle(None, 0.0, None)];
     assert!(chart.svg().contains("data-cycles=\"* 0.00\"") && !chart.svg().contains("class=\"stance"));
 }

@@ -14,7 +14,8 @@ pub fn drawn(gait: &Gait) -> Gait {
     gait.refined(DRAWN_PARTS)
 }
 
-/// Stroke of a gait: solid for the first one, dashed for the others.
+/// Stroke of a gait among several; a reference gait is dotted.
 pub(super) fn stroke(place: usize) -> Stroke {
-    if place == 0 { Stroke::Solid } else { Stroke::Dashed }
+    const STROKES: [Stroke; 4] = [Stroke::Solid, Stroke::Dashed, Stroke::DashDotted, Stroke::LongDashed];
+    STROKES[place % STROKES.len()]
 }

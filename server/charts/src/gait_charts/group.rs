@@ -1,6 +1,6 @@
 //! Groups of figures, as pages show them under one heading.
 
-use crate::{Chart, Drawing, Figure};
+use crate::{Chart, Figure};
 
 /// Figures that belong together.
 #[derive(Debug)]
@@ -19,14 +19,5 @@ impl Group {
     pub(super) fn new(id: &'static str, heading: &'static str, hint: impl Into<String>, charts: Vec<Chart>) -> Self {
         let figures = charts.into_iter().map(|chart| Figure::chart(id, chart)).collect();
         Self { id, heading, hint: hint.into(), figures }
-    }
-
-    /// Whether its charts mark the stance and swing of the legs.
-    pub fn marks_stances(&self) -> bool {
-        let marks = |figure: &Figure| match &figure.drawing {
-            Drawing::Chart(chart) => chart.cycles.iter().any(|cycle| cycle.toe_off_percent.is_some()),
-            _ => false,
-        };
-        self.figures.iter().any(marks)
     }
 }

@@ -1,62 +1,179 @@
-//! Joint angles with the reference gait.
+//! Joint angles. Every chart of them is made here, from [`JointAngle`]s, which know the leg over whose cycle they are drawn.
 
-use super::drawn_gait::{STRIDE, drawn, stroke};
+use super::drawn_gait::{drawn, stroke};
 use super::group::Group;
-use super::leg_cycle::{Cycle, Leg};
-use super::legs::{CYCLE, JOINTS, of_legs};
-use crate::gait_series::Point;
-use crate::{Chart, LegCycle, band_in_words, over_reference, over_reference_of_leg};
-use gait_optimizer::body::Side;
+use super::leg_cycle::{Cycle, Leg, Look};
+use super::legs::{CYCLE, JOINTS};
+use super::reference_curve::{band_in_words, cycle_of, with_curve};
+use crate::{Chart, Stroke};
 use gait_optimizer::{Gait, ReferenceGait};
 
-/// Title and index into q and into the reference of the five human coordinates.
-const ANGLES: [(&str, usize, usize); 5] =
-    [("Torso lean", 2, 0), ("Left hip", 3, 1), ("Left knee", 4, 2), ("Left ankle", 5, 3), ("Right hip", 6, 4)];
-/// Torso, hip, knee and ankle. The reference has three joints of the left leg and the right hip.
+/// Colour of a reference gait beside several gaits.
+const REFERENCE: usize = 7;
+/// What a band shows.
+const ONE_DEVIATION: &str = "one standard deviation";
+
+/// An angle with the leg over whose cycle it is drawn, from the heel strike of that leg.
+#[derive(Debug, Clone, Copy)]
+struct JointAngle {
+    /// Name of the chart of this angle alone.
+    title: &'static str,
+    leg: Leg,
+    /// Index into q.
+    coordinate: usize,
+    /// Column of the reference gait, which has no angles of the joints of the prosthesis.
+    column: Option<usize>,
+}
+
+const fn angle(title: &'static str, leg: Leg, coordinate: usize, column: Option<usize>) -> JointAngle {
+    JointAngle { title, leg, coordinate, column }
+}
+
+/// Each joint on both sides: left, right. The torso leans over the cycle of each leg.
+const BOTH_SIDES: [(&str, [JointAngle; 2]); 4] = [
+    (JOINTS[0], [angle("Left hip", Leg::Left, 3, Some(1)), angle("Right hip", Leg::Right, 6, Some(4))]),
+    (JOINTS[1], [angle("Left knee", Leg::Left, 4, Some(2)), angle("Right knee (prosthesis)", Leg::Right, 7, None)]),
+    (JOINTS[2], [angle("Left ankle", Leg::Left, 5, Some(3)), angle("Right ankle (prosthesis)", Leg::Right, 8, None)]),
+    ("Torso lean", [angle("Torso lean", Leg::Left, 2, Some(0)), angle("Torso lean", Leg::Right, 2, Some(0))]),
+];
+
+/// Every angle once; the torso over the cycle of the right leg.
+fn every_angle() -> impl Iterator<Item = JointAngle> {
+    let sides = BOTH_SIDES.into_iter().flat_map(|(_, sides)| sides);
+    sides.filter(|angle| (angle.title, angle.leg) != ("Torso lean", Leg::Left))
+}
+
+impl JointAngle {
+    fn with_reference(self, chart: Chart, reference: &ReferenceGait, look: &Look<'_>, band: Option<&str>) -> Chart {
+        match self.column {
+            Some(column) => with_curve(chart, reference, (column, self.leg), look, band),
+            None => chart,
+        }
+    }
+
+    fn with_gait(self, chart: Chart, cycle: &Cycle<'_>, look: &Look<'_>) -> Chart {
+        cycle.with_line(chart, self.leg, look, |point| point.q[self.coordinate].to_degrees())
+    }
+}
+
+fn chart(title: &str, cycle: &str) -> Chart {
+    Chart::new(title, cycle, "angle, °")
+}
+
+/// Hip, knee, ankle and torso of a gait, both legs in one chart.
 pub(super) fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
-    let over = |title: &str, references: &[(Leg, usize)]| {
-        references.iter().fold(Chart::new(title, CYCLE, "angle, °"), |chart, &(leg, column)| {
-            let name = if leg == Leg::Left { "left" } else { "right" };
-            over_reference_of_leg(chart, reference, column, (leg.colour(), name), cycle.strike_percent(leg))
-        })
+    let draw = |(title, sides): (&str, [JointAngle; 2])| {
+        let below = sides.iter().fold(chart(title, CYCLE), |chart, angle| {
+            let [label, band] = ["reference", ONE_DEVIATION].map(|what| format!("{what}, {}", angle.leg.name()));
+            let look = Look { label: &label, colour: angle.leg.colour(), stroke: Stroke::Dotted };
+            angle.with_reference(chart, reference, &look, Some(&band))
+        });
+        sides.iter().fold(below, |chart, angle| angle.with_gait(chart, cycle, &Look::of(angle.leg)))
     };
-    let joint = |place: usize, references: &[(Leg, usize)]| {
-        let angle = |side: Side| move |p: &Point<'_>| p.q[side.hip() + place].to_degrees();
-        of_legs(cycle, over(JOINTS[place], references), angle(Side::Left), angle(Side::Right))
-    };
-    let torso = |p: &Point<'_>| p.q[2].to_degrees();
-    let charts = vec![
-        joint(0, &[(Leg::Left, 1), (Leg::Right, 4)]),
-        joint(1, &[(Leg::Left, 2)]),
-        joint(2, &[(Leg::Left, 3)]),
-        of_legs(cycle, over("Torso lean", &[(Leg::Right, 0)]), torso, torso),
-    ];
     let hint = format!(
         "Flexion, dorsiflexion and forward lean are positive. Torso lean is drawn over the cycle of each leg. Reference gait: {}. {} There is no reference for the joints of the prosthesis.",
         reference.name,
         band_in_words(reference)
     );
-    Group::new("angles", "Joint angles", hint, charts)
+    Group::new("angles", "Joint angles", hint, BOTH_SIDES.into_iter().map(draw).collect())
 }
 
-/// The joint angles of a reference alone: title and chart.
+/// The joint angles of a reference gait alone, both legs in one chart.
 pub fn of_reference(reference: &ReferenceGait) -> Vec<Chart> {
-    let chart = |&(title, _, column): &(&str, usize, usize)| {
-        over_reference(Chart::new(title, STRIDE, "angle, °"), reference, column)
+    let draw = |(title, sides): (&str, [JointAngle; 2])| {
+        let known = sides.iter().filter(|angle| angle.column.is_some());
+        known.fold(chart(title, CYCLE), |chart, angle| {
+            let label = format!("{} leg", angle.leg.name());
+            let look = Look { label: &label, ..Look::of(angle.leg) };
+            let band = format!("{ONE_DEVIATION}, {}", angle.leg.name());
+            let mut chart = angle.with_reference(chart, reference, &look, Some(&band));
+            chart.cycles.push(cycle_of(angle.leg, &look));
+            chart
+        })
     };
-    ANGLES.iter().map(chart).collect()
+    BOTH_SIDES.into_iter().map(draw).collect()
 }
 
-/// The human joint angles of gaits and of a reference. Each gait comes with its name.
+/// The joint angles of a reference gait in one chart.
+pub fn of_reference_in_one_chart(reference: &ReferenceGait) -> Chart {
+    let known = every_angle().filter(|angle| angle.column.is_some()).enumerate();
+    known.fold(chart("Reference gait", CYCLE), |chart, (place, angle)| {
+        let label = angle.title.to_lowercase();
+        let look = Look { label: &label, colour: place, stroke: Stroke::APART[place % Stroke::APART.len()] };
+        angle.with_reference(chart, reference, &look, None)
+    })
+}
+
+/// The joint angles of gaits over those of a reference gait, a chart for each joint. Each gait comes with its name.
 pub fn with_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
     let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
-    let draw = |&(title, q, column): &(&str, usize, usize)| {
-        let mut chart = over_reference(Chart::new(title, STRIDE, "angle, °"), reference, column);
-        chart.cycles = vec![LegCycle { colour: None, begins_percent: 0.0, toe_off_percent: None }];
-        for (place, (name, gait)) in gaits.iter().enumerate() {
-            chart = chart.with(name, place, stroke(place), Cycle::of(gait).over(|p| p.q[q].to_degrees()));
-        }
-        chart
+    let cycles: Vec<(&str, Cycle<'_>)> = gaits.iter().map(|(name, gait)| (*name, Cycle::of(gait))).collect();
+    let draw = |angle: JointAngle| {
+        let chart = chart(angle.title, &format!("gait cycle from {} heel strike, %", angle.leg.name()));
+        let look = Look { label: "reference", colour: REFERENCE, stroke: Stroke::Dotted };
+        let chart = angle.with_reference(chart, reference, &look, Some(ONE_DEVIATION));
+        cycles.iter().enumerate().fold(chart, |chart, (place, (name, cycle))| {
+            angle.with_gait(chart, cycle, &Look { label: name, colour: place, stroke: stroke(place) })
+        })
     };
-    ANGLES.iter().map(draw).collect()
+    every_angle().map(draw).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gait_optimizer::reference::REFERENCE_ROWS;
+
+    /// Every chart of joint angles of a reference gait with a standard deviation, beside no gait.
+    fn charts() -> (ReferenceGait, Vec<Chart>) {
+        let mut reference = ReferenceGait::builtin().unwrap();
+        reference.standard_deviation_rad = Some(vec![[0.1; 5]; REFERENCE_ROWS]);
+        let mut charts = of_reference(&reference);
+        charts.extend(with_reference(&[], &reference));
+        charts.push(of_reference_in_one_chart(&reference));
+        (reference, charts)
+    }
+
+    #[test]
+    fn left_swing_peak_of_the_knee_follows_the_left_heel_strike() {
+        let (_, charts) = charts();
+        let knees = charts.iter().flat_map(|chart| {
+            let is_knee =
+                |label: &str| chart.title == "Knee" || format!("{} {label}", chart.title).contains("eft knee");
+            chart.series.iter().filter(move |series| is_knee(&series.label))
+        });
+        let peaks: Vec<f64> =
+            knees.map(|series| series.points.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap().0).collect();
+        assert_eq!(peaks.len(), 3, "with both legs, beside gaits, and with all angles");
+        // A knee is most flexed in swing, at about 70 % of the cycle of its leg.
+        assert!(peaks.iter().all(|peak| (65.0..80.0).contains(peak)), "{peaks:?}");
+    }
+
+    #[test]
+    fn reference_of_the_left_leg_begins_half_a_stride_later() {
+        let (reference, charts) = charts();
+        let (knee, at) = (&charts[1], |row: usize| reference.angles_rad[row][2].to_degrees());
+        assert_eq!(knee.series.len(), 1, "a reference gait has no right knee");
+        let heights: Vec<f64> = [0, 20, 50, 51, 100].map(|percent| knee.series[0].points[percent].1).into();
+        assert_eq!(heights, [at(50), at(70), at(100), at(1), at(50)]);
+        let (_, low, high) = knee.bands[0].points[0];
+        assert!((high - low - 0.2_f64.to_degrees()).abs() < 1e-9);
+        assert_eq!((knee.cycles[0].begins_percent, knee.cycles[0].colour), (50.0, Some(Leg::Left.colour())));
+    }
+
+    #[test]
+    fn torso_has_the_band_of_each_leg() {
+        let (_, charts) = charts();
+        let torso = charts.iter().find(|chart| chart.title == "Torso lean").unwrap();
+        let names: Vec<&str> = torso.bands.iter().map(|band| band.label.as_str()).collect();
+        assert_eq!(names, ["one standard deviation, left", "one standard deviation, right"]);
+    }
+
+    #[test]
+    fn every_joint_beside_gaits_has_a_chart_even_without_a_reference() {
+        let titles: Vec<String> = with_reference(&[], &charts().0).into_iter().map(|chart| chart.title).collect();
+        let expected =
+            "Left hip, Right hip, Left knee, Right knee (prosthesis), Left ankle, Right ankle (prosthesis), Torso lean";
+        assert_eq!(titles.join(", "), expected);
+    }
 }

@@ -44,11 +44,34 @@ impl Leg {
         }
     }
 
+    /// Its side in words.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        }
+    }
+
     pub(super) fn stroke(self) -> Stroke {
         match self {
             Self::Left => Stroke::Solid,
             Self::Right => Stroke::Dashed,
         }
+    }
+}
+
+/// Name and look of a curve.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Look<'a> {
+    pub(super) label: &'a str,
+    pub(super) colour: usize,
+    pub(super) stroke: Stroke,
+}
+
+impl Look<'_> {
+    /// The look of a leg where both legs of a gait are in one chart.
+    pub(super) fn of(leg: Leg) -> Self {
+        Self { label: leg.label(), colour: leg.colour(), stroke: leg.stroke() }
     }
 }
 
@@ -86,7 +109,7 @@ impl<'a> Cycle<'a> {
     }
 
     /// Where in the stride the cycle of a leg begins, percent from right heel strike.
-    pub(super) fn strike_percent(&self, leg: Leg) -> f64 {
+    fn strike_percent(&self, leg: Leg) -> f64 {
         match leg {
             Leg::Left => self.points.get(self.left_strike).map_or(0.0, |point| 100.0 * point.time_s / self.end),
             Leg::Right => 0.0,
@@ -95,6 +118,11 @@ impl<'a> Cycle<'a> {
 
     /// Adds the line of a leg, over the cycle from its own heel strike.
     pub(super) fn with_leg(&self, chart: Chart, leg: Leg, y: impl FnMut(&Point<'_>) -> f64) -> Chart {
+        self.with_line(chart, leg, &Look::of(leg), y)
+    }
+
+    /// The same with another name and look.
+    pub(super) fn with_line(&self, chart: Chart, leg: Leg, look: &Look<'_>, y: impl FnMut(&Point<'_>) -> f64) -> Chart {
         let strike = self.strike_percent(leg);
         // The stride is periodic: what comes before the strike follows its end.
         let (before, after) = match leg {
@@ -105,10 +133,10 @@ impl<'a> Cycle<'a> {
         let mut places = own.clone().map(|(point, later)| 100.0 * point.time_s / self.end - strike + later);
         let own = own.map(|(point, _)| point);
         let points = line(own, |_| places.next().unwrap_or(f64::NAN), y, |_| true);
-        let mut chart = chart.with(leg.label(), leg.colour(), leg.stroke(), points);
+        let mut chart = chart.with(look.label, look.colour, look.stroke, points);
         let toe_off = self.toe_off_percent[usize::from(leg == Leg::Right)];
         chart.cycles.push(LegCycle {
-            colour: Some(leg.colour()),
+            colour: Some(look.colour),
             begins_percent: strike,
             toe_off_percent: toe_off.map(|percent| (percent - strike).rem_euclid(100.0)),
         });

@@ -3,12 +3,20 @@
 use super::recording_traces::StrideSpan;
 use gait_optimizer::ReferenceGait;
 use gait_optimizer::reference::RecordedStride;
-use gaitwright_charts::{Figure, gait_charts};
+use gaitwright_charts::{Figure, band_in_words, gait_charts};
 
 /// Every figure of a reference gait.
 pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
     let charts = gait_charts::of_reference(reference).into_iter();
     charts.map(|chart| Figure::chart("reference", chart)).collect()
+}
+
+/// What the figures show.
+pub(crate) fn in_words(reference: &ReferenceGait) -> String {
+    format!(
+        "Each curve begins with the heel strike of its leg; the left foot is taken to strike half a stride after the right foot. {}",
+        band_in_words(reference)
+    )
 }
 
 /// The strides of a recording for its charts.

@@ -135,7 +135,10 @@ fn sections(shown: &[StudyWithBest], reference: &ReferenceGait) -> Result<Vec<Fi
         FigureSection {
             id: "angles",
             heading: "Joint angles of the best gait",
-            hint: format!("Figure 3c of the paper, with the reference gait. {}", band_in_words(reference)),
+            hint: format!(
+                "Figure 3c of the paper, with the reference gait. Each joint is drawn over the gait cycle of its leg. {} There is no reference for the joints of the prosthesis.",
+                band_in_words(reference)
+            ),
             figures: charts("angles", gait_charts::with_reference(&gaits, reference)),
         },
         FigureSection {

@@ -1,6 +1,6 @@
 //! The page with the figures of a study, or of two.
 
-use super::page_chart::PageChart;
+use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::{Named, accessible};
 use crate::authorization::Authorized;
@@ -28,7 +28,15 @@ struct FiguresPage {
     other: Option<StudyId>,
     offered: Vec<Study>,
     sessions: Vec<(LabSessionId, u32)>,
-    sections: Vec<(FigureSection, Vec<PageChart>)>,
+    sections: Vec<DrawnSection>,
+}
+
+/// A section as the page shows it.
+struct DrawnSection {
+    section: FigureSection,
+    /// The legend that the charts share; empty if each has its own.
+    legend: Vec<(String, String)>,
+    charts: Vec<PageChart>,
 }
 
 impl FiguresPage {
@@ -68,8 +76,8 @@ pub(super) async fn get(
     let query = other.map_or_else(String::new, |other| format!("?other={other}"));
     let files = format!("/api/v1/studies/{id}/figures");
     let drawn = |section: FigureSection| {
-        let drawn = section.figures.iter().map(|figure| PageChart::of(figure, &files, &query)).collect();
-        (section, drawn)
+        let mut charts: Vec<PageChart> = section.figures.iter().map(|f| PageChart::of(f, &files, &query)).collect();
+        DrawnSection { legend: shared_legend(&mut charts), charts, section }
     };
     page(&FiguresPage {
         study,

@@ -210,8 +210,6 @@ struct ChartSection {
     hint: String,
     /// The legend of all charts; empty if each has its own.
     legend: Vec<(String, String)>,
-    /// Whether the charts mark stance and swing.
-    has_stances: bool,
     charts: Vec<PageChart>,
 }
 
@@ -239,7 +237,6 @@ fn draw(
         ChartSection {
             id: group.id,
             heading: group.heading,
-            has_stances: group.marks_stances(),
             hint: group.hint,
             legend: shared_legend(&mut charts),
             charts,

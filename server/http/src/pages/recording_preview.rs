@@ -22,8 +22,9 @@ pub(super) struct RecordingPreview {
     pub(super) strides: Vec<StrideRow>,
     /// Whether strides can be rejected in the form.
     pub(super) can_reject: bool,
-    /// The mean stride.
+    /// The mean stride, and the legend of its charts.
     pub(super) mean: Vec<PageChart>,
+    pub(super) mean_legend: Vec<(String, String)>,
 }
 
 /// A stride in the table.
@@ -52,6 +53,7 @@ impl RecordingPreview {
             strides: strides.iter().enumerate().map(row).collect(),
             can_reject: false,
             mean: Vec::new(),
+            mean_legend: Vec::new(),
         }
     }
 
@@ -107,13 +109,14 @@ impl RecordingPreview {
         let usage = |place: usize| {
             if preview.strides[place].is_used { "used" } else { "left out: too short, too long, or with a gap" }
         };
-        let (mean, refused, warning) = match &preview.reference {
+        let (mut mean, refused, warning): (Vec<PageChart>, _, _) = match &preview.reference {
             Ok(found) => {
                 let charts = gait_charts::of_reference(found).iter().map(PageChart::new).collect();
                 (charts, Vec::new(), found.warning().ok().flatten())
             }
             Err(error) => (Vec::new(), vec![form_errors::in_words(error)], None),
         };
-        Self { refused, warning, mean, ..Self::new(&charts, &strides, usage) }
+        let mean_legend = shared_legend(&mut mean);
+        Self { refused, warning, mean, mean_legend, ..Self::new(&charts, &strides, usage) }
     }
 }

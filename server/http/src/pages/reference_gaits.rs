@@ -1,6 +1,6 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
-use super::page_chart::PageChart;
+use super::page_chart::{PageChart, shared_legend};
 use super::recording_preview::RecordingPreview;
 use crate::AppState;
 use crate::accessible::Id;
@@ -221,6 +221,9 @@ struct ReferenceGaitPage {
     warning: Option<String>,
     steps: Vec<String>,
     charts: Vec<PageChart>,
+    /// The legend of the charts, and what they show.
+    legend: Vec<(String, String)>,
+    hint: String,
 }
 
 impl ReferenceGaitPage {
@@ -237,14 +240,16 @@ pub(super) async fn get(
     Id(id, _): Id<ReferenceGaitId, Read>,
 ) -> PageResult {
     let reference = reference_gaits::get(&mut *app.read().await?, id).await?;
+    let figures = reference_figures::of_reference(&reference.definition);
+    let drawn = |figure| PageChart::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), "");
+    let mut charts: Vec<PageChart> = figures.iter().map(drawn).collect();
     page(&ReferenceGaitPage {
         units,
         warning: reference.definition.warning().map_err(Error::from)?,
         steps: reference.definition.provenance.lines().map(str::to_owned).collect(),
-        charts: reference_figures::of_reference(&reference.definition)
-            .iter()
-            .map(|figure| PageChart::of(figure, &format!("/api/v1/reference-gaits/{id}/figures"), ""))
-            .collect(),
+        legend: shared_legend(&mut charts),
+        charts,
+        hint: reference_figures::in_words(&reference.definition),
         reference,
     })
 }

@@ -2,15 +2,11 @@
 
 use super::super::page_chart::PageChart;
 use askama::Template;
-use gaitwright_charts::{Chart, Stroke};
+use gaitwright_charts::gait_charts;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
-use gaitwright_store::reference_gaits::ReferenceGait;
 use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::{Connection, ReferenceGaitId};
-
-/// The angles of a reference gait, by column.
-const ANGLES: [&str; 5] = ["torso lean", "left hip", "left knee", "left ankle", "right hip"];
 
 #[derive(Template)]
 #[template(path = "chosen_reference.html")]
@@ -37,7 +33,7 @@ impl ReferenceChoice {
     pub(super) fn shown(&self) -> Result<String, Error> {
         let chosen = self.matches.iter().find(|found| found.reference_gait.id == self.chosen);
         let Some(chosen) = chosen else { return Ok(String::new()) };
-        let chart = PageChart::new(&chart(&chosen.reference_gait));
+        let chart = PageChart::new(&gait_charts::of_reference_in_one_chart(&chosen.reference_gait.definition));
         let measured = self.matches.iter().any(|found| found.distance.is_some());
         let part = ChosenReference { nearest: nearest(&self.matches, chosen), measured, chart };
         part.render().map_err(|e| Error::Internal(e.to_string()))
@@ -74,14 +70,4 @@ fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> Strin
         }
         None => String::new(),
     }
-}
-
-/// All joint angles over one stride.
-fn chart(reference: &ReferenceGait) -> Chart {
-    let chart = Chart::new("Reference gait", "gait cycle from right heel strike, %", "angle, °");
-    ANGLES.iter().enumerate().fold(chart, |chart, (column, name)| {
-        let rows = reference.definition.angles_rad.iter().enumerate();
-        let line = rows.map(|(row, angles)| (row as f64, angles[column].to_degrees())).collect();
-        chart.with(name, column, Stroke::APART[column % Stroke::APART.len()], line)
-    })
 }
