@@ -1,5 +1,5 @@
 // @ts-check
-// Shows values of a chart beside the pointer or finger: over a gait cycle those of all lines, otherwise that of the nearest
+// Shows values of a chart beside the pointer or finger, or below a small chart: over a gait cycle those of all lines, otherwise that of the nearest
 // point. The CSV file of each figure has the exact values, even for users without a pointer.
 
 import { heightAt, linesOf, nameOf, nearestOn, valueAt } from "./chart_lines.mjs";
@@ -64,21 +64,29 @@ function nearest(chart, at) {
   ];
 }
 
-/** @param {string[]} lines @param {PointerEvent} event */
-function say(lines, event) {
+/**
+ * Beside the pointer, or below or above a chart of which it would cover a large part.
+ * @param {string[]} lines @param {PointerEvent} event @param {Element} chart
+ */
+function say(lines, event, chart) {
   readout.replaceChildren(...lines.map((line) => Object.assign(document.createElement("div"), { textContent: line })));
   readout.hidden = false;
+  const drawing = chart.getBoundingClientRect();
+  const isBeside = drawing.width >= 3 * readout.offsetWidth;
+  const isBelow = drawing.bottom + readout.offsetHeight <= innerHeight;
+  const left = isBeside ? event.pageX + 14 : drawing.left + scrollX;
+  const outside = isBelow ? drawing.bottom : drawing.top - readout.offsetHeight;
   const room = document.documentElement.clientWidth - readout.offsetWidth - 8;
-  readout.style.left = `${Math.max(Math.min(event.pageX + 14, room), 4)}px`;
-  readout.style.top = `${event.pageY + 18}px`;
+  readout.style.left = `${Math.max(Math.min(left, room), 4)}px`;
+  readout.style.top = `${isBeside ? event.pageY + 18 : outside + scrollY}px`;
 }
 
 /** @param {PointerEvent} event */
 function show(event) {
-  const link = /** @type {Element} */ (event.target).closest?.("svg.chart a")?.getAttribute("aria-label");
+  const link = /** @type {Element} */ (event.target).closest?.("svg.chart a");
   if (link) {
     here.remove();
-    return say([link], event);
+    return say([String(link.getAttribute("aria-label"))], event, /** @type {Element} */ (link.closest("svg")));
   }
   const chart = /** @type {SVGSVGElement | null} */ (/** @type {Element} */ (event.target).closest?.("svg[data-right]"));
   const matrix = chart?.getScreenCTM();
@@ -86,7 +94,7 @@ function show(event) {
   const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
   const lines = chart.dataset.cycles ? acrossLines(chart, at.x) : nearest(chart, at);
   if (lines.length === 0) return hide();
-  say(lines, event);
+  say(lines, event, chart);
 }
 
 for (const kind of ["pointermove", "pointerdown"]) document.addEventListener(kind, (event) => show(/** @type {PointerEvent} */ (event)));

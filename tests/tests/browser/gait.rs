@@ -62,6 +62,36 @@ async fn browser_walker_stays_in_sight_beside_and_above_the_charts() {
         assert!(shown > 100.0 && shown <= highest, "{width} x {height}: {shown}");
         assert_eq!(page.beyond().await, "0");
     }
+    // Beside the charts, the whole box is in sight: figure, controls and legend.
+    page.resize(1280, 800).await;
+    let (bottom, ..) = page.lowest(".viewer > .walker-box :is(.controls, .legend, .export)").await;
+    assert!(bottom <= 800.0, "{bottom}");
+    let scrolls = "(() => { const box = document.querySelector('.viewer > .walker-box'); return box.scrollHeight > box.clientHeight })()";
+    assert_eq!(page.value(scrolls).await, "false");
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_readout_does_not_cover_a_small_chart() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let (site, trial) = with_a_gait().await;
+    let page = browser.open(&site.at(&format!("/trials/{trial}"))).await;
+    page.wait_for("[data-play]").await;
+    page.resize(390, 844).await;
+    // In the middle of the screen, and where there is no room below.
+    for block in ["center", "end"] {
+        let covered = format!(
+            "(() => {{ const chart = document.querySelector('#angles svg.chart'); chart.scrollIntoView({{ block: '{block}' }}); \
+             const at = chart.getBoundingClientRect(); chart.dispatchEvent(new PointerEvent('pointermove', {{ bubbles: true, \
+               clientX: at.left + at.width / 2, clientY: at.top + at.height / 2 }})); \
+             const box = document.querySelector('.readout').getBoundingClientRect(); \
+             return [box.height > 0, box.top < at.bottom - 1 && at.top + 1 < box.bottom].join() }})()"
+        );
+        assert_eq!(page.value(&covered).await, "true,false", "{block}");
+    }
+    let names = page.text(".readout").await;
+    assert!(names.contains("left leg: ") && names.contains("reference, right: "), "{names}");
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

@@ -308,7 +308,7 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
     assert_eq!(page.value(&format!("{means}.every((mean, i, all) => i === 0 || mean <= all[i - 1])")).await, "true");
     // Where Gait RMSE answers, it decides, and not the analysis beside it.
     let by_rmse = "[...document.querySelectorAll('#best tbody tr')].slice(1).every((row, i, all) => \
-        row.cells[3].textContent === (Number(row.cells[1].textContent) > Number(document.querySelector('#best tr.best').cells[1].textContent) \
+        row.cells[1].textContent === (Number(row.cells[3].textContent) > Number(document.querySelector('#best tr.best').cells[3].textContent) \
         ? 'yes, by Gait RMSE' : 'no, by Gait RMSE'))";
     assert_eq!(page.value(by_rmse).await, "true");
     let bars = "[...document.querySelectorAll('#main-effects rect')].map(bar => bar.width.baseVal.value)";
@@ -628,6 +628,27 @@ async fn browser_prints_the_recommended_gait_with_date_and_version() {
         assert_eq!(page.value(&shown(selector)).await, printed, "{selector}");
     }
     assert!(page.text("p.paper").await.contains(concat!("Gaitwright ", env!("CARGO_PKG_VERSION"))));
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn browser_shows_the_analysis_whole_on_a_phone_and_on_paper() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.number_of_trials = 12).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let page = browser.open(&site.at(&format!("/studies/{study}/analysis"))).await;
+    page.resize(390, 844).await;
+    // Whether a gait is better is said beside its number, in sight without scrolling across.
+    let answer = "(() => { const cell = document.querySelector('#best tbody tr:last-child').cells[1]; \
+                   return /Gait RMSE/.test(cell.textContent) && cell.getBoundingClientRect().right <= innerWidth })()";
+    assert_eq!(page.value(answer).await, "true");
+    page.be_paper().await;
+    page.resize(718, 1000).await;
+    let cut = "[...document.querySelectorAll('.across')].filter(box => box.scrollWidth > box.clientWidth + 1).length";
+    assert_eq!(page.count(".across").await, 3, "two maps and every trial");
+    assert_eq!(page.value(cut).await, "0");
+    assert_eq!(page.beyond().await, "0");
     browser.close().await;
 }
 
