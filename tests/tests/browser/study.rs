@@ -85,6 +85,8 @@ async fn browser_follows_a_running_solve() {
     let text = "document.querySelector('.running [data-text]')?.textContent ?? ''";
     let drawing = "document.querySelector('.running .chart .line')?.getAttribute('d') ?? ''";
     let (early, drawn) = (page.value(text).await, page.value(drawing).await);
+    // Folded away until somebody wants to see it.
+    assert_eq!(page.value("document.querySelector('.running svg.chart').checkVisibility()").await, "false");
     page.wait_until(&format!("({text}) !== {early:?} && ({drawing}) !== {drawn:?}")).await;
     page.wait_for("[data-part=state] .state.finished").await;
     assert_eq!(page.count(".running").await, 0);
@@ -105,6 +107,11 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
             .await
             .contains("An animation of the recommended gait appears here after the first converged trial")
     );
+    assert!(page.text("[data-part=state]").await.contains("The time left can be estimated after 3 more solves."));
+    // Progress and the place of the best gait lead; the solve that runs is one line.
+    page.wait_for(".running").await;
+    let (bottom, ..) = page.lowest("progress, .running p").await;
+    assert!(bottom <= 420.0, "{bottom}");
     // The first gait walks without a reload, and the better one after it.
     page.run("window.same = true").await;
     page.wait_for(".outcome fieldset:enabled [data-phase]").await;
@@ -118,15 +125,15 @@ async fn browser_shows_the_best_gait_so_far_of_a_running_study_and_the_time_left
     let (bottom, ..) = page.lowest(".outcome svg.gait-walker").await;
     assert!(bottom <= 800.0, "{bottom}");
     page.is_clean(&site.origin).await;
-    let told = async |trials: u32| {
-        let fresh = site.service.study(|new| new.number_of_trials = trials).await;
-        site.service.fetch(&format!("/studies/{fresh}")).await.text
-    };
-    let long = told(8).await;
-    assert!(long.contains("The time left can be estimated after 3 more solves."), "{long}");
+    // Before its first result a study is estimated from earlier ones.
+    let fresh = site.service.study(|new| new.number_of_trials = 8).await;
+    let page = site.service.fetch(&format!("/studies/{fresh}")).await.text;
+    assert!(page.contains(" left for 8 trials; half of the earlier solves here took less than "), "{page}");
     // An estimate that can never come is not announced.
-    let short = told(2).await;
-    assert!(!short.contains("can be estimated"), "{short}");
+    let site = Site::start(Analytic::slow(Duration::from_millis(400))).await;
+    let short = site.service.study(|new| new.number_of_trials = 2).await;
+    let page = site.service.fetch(&format!("/studies/{short}")).await.text;
+    assert!(!page.contains("can be estimated"), "{page}");
     browser.close().await;
 }
 

@@ -170,6 +170,7 @@ pub(super) async fn read_live(
         without.conflict = explained.and_then(|made| made.explanation.headline(ANGLES)).unwrap_or_default();
     }
     let mut best = BestFindings::read(&mut reader, outcome.best, certification).await?;
+    let earlier = trials::measured(&mut reader, snapshot.study.plan.muscles).await?;
     drop(reader);
     if let Some(next) = best.certification.without_certificate {
         best.certification.certified_by_service(app.scheduler.is_certifying(id, next));
@@ -184,7 +185,7 @@ pub(super) async fn read_live(
     answers.truncate(ANSWERS);
     let is_queued = snapshot.trials.iter().any(|trial| trial.state == TrialState::Queued);
     let found = StudyFindings { outcome, certainty, utility, best, without_gait };
-    let pace = time_left(&snapshot, counts.results(), app.scheduler.workers());
+    let pace = time_left(&snapshot, counts.results(), app.scheduler.workers(), earlier);
     // A large study shows only its newest trials, so whether a bound was ever active is unknown.
     let inactive = if large { Vec::new() } else { never_active(&snapshot) };
     let mut live = view(snapshot, counts, found, running, table, answers, caller.may(Run::NEEDED));

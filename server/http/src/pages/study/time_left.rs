@@ -1,15 +1,16 @@
-//! How long a running study still takes, from its own finished solves.
+//! How long a running study still takes, from its own finished solves, or from earlier ones before there are enough.
 
 use crate::format;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{Evaluation, StudyState};
+use gaitwright_store::trials::SolveTimes;
 
-/// With fewer finished solves there is no estimate: the first one starts cold and takes longer than the others.
+/// With fewer finished solves the study itself gives no estimate: the first one starts cold and takes longer than the others.
 const FEWEST_SOLVES: usize = 3;
 
 /// A sentence about the time left; empty unless the study runs. `results` is the number of trials with a result, `workers` the
-/// number of solves that can run at a time.
-pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) -> String {
+/// number of solves that can run at a time. The first solves are estimated from `earlier` ones of any study.
+pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize, earlier: Option<SolveTimes>) -> String {
     let study = &snapshot.study;
     if study.state != StudyState::Running {
         return String::new();
@@ -22,7 +23,8 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
     if left == 0 {
         return "All trials have been solved.".to_owned();
     }
-    let Some(median) = median(&solves) else {
+    let own = median(&solves).map(|median| (median, "the solves so far"));
+    let Some((median, of)) = own.or(earlier.map(|earlier| (earlier.median_seconds, "the earlier solves here"))) else {
         let missing = FEWEST_SOLVES - solves.len();
         if left as usize <= missing {
             return String::new();
@@ -30,7 +32,8 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
         let solves = if missing == 1 { "1 more solve".to_owned() } else { format!("{missing} more solves") };
         return format!("The time left can be estimated after {solves}.");
     };
-    let parallel = (study.plan.parallel_trials as usize).min(workers).max(1);
+    // Earlier solves may have had the machine to themselves, so solves in parallel are not counted as faster.
+    let parallel = if own.is_some() { (study.plan.parallel_trials as usize).min(workers).max(1) } else { 1 };
     let mut seconds = median * f64::from(left) / parallel as f64;
     if let Some(budget) = study.plan.solve_seconds_budget {
         let spent: f64 = solves.iter().sum();
@@ -40,7 +43,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize) 
     let trials = if left == 1 { "1 trial".to_owned() } else { format!("{left} trials") };
     let people = format::also_waits_for(study.plan.answer_source);
     format!(
-        "{at_most} {} left for {trials}{people}; half of the solves so far took less than {}.",
+        "{at_most} {} left for {trials}{people}; half of {of} took less than {}.",
         format::duration(seconds),
         format::duration(median)
     )
