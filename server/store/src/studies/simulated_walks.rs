@@ -48,15 +48,20 @@ pub struct SimulatedWalks {
     /// What they do.
     pub effect: SimulatedWalksEffect,
     /// Number of simulated walks on each of the three kinds of ground, 1 to 1000.
-    pub number: u32,
+    pub number_of_simulated_walks: u32,
     /// `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
     pub gait_rmse_tolerance_rad: f64,
-    /// `label`: the least mean number of strides of an executable gait. A complete walk has 20 strides. 0 to 20.
+    /// `label`: the least mean number of strides of an executable gait. A complete simulated walk has 20 strides. 0 to 20.
     pub least_mean_strides: f64,
 }
 
 impl Default for SimulatedWalks {
     fn default() -> Self {
-        Self { effect: SimulatedWalksEffect::None, number: 50, gait_rmse_tolerance_rad: 0.05, least_mean_strides: 3.0 }
+        Self {
+            effect: SimulatedWalksEffect::None,
+            number_of_simulated_walks: 50,
+            gait_rmse_tolerance_rad: 0.05,
+            least_mean_strides: 3.0,
+        }
     }
 }

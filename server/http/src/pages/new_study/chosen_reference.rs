@@ -5,7 +5,7 @@ use askama::Template;
 use gaitwright_charts::{Chart, Stroke};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
-use gaitwright_store::reference_gaits::ReferenceGait;
+use gaitwright_store::reference_gaits::ReferenceGaitRow;
 use gaitwright_store::studies::StudyPlan;
 use gaitwright_store::{Connection, ReferenceGaitId};
 
@@ -77,7 +77,7 @@ fn nearest(matches: &[ReferenceGaitMatch], chosen: &ReferenceGaitMatch) -> Strin
 }
 
 /// All joint angles over one stride.
-fn chart(reference: &ReferenceGait) -> Chart {
+fn chart(reference: &ReferenceGaitRow) -> Chart {
     let chart = Chart::new("Reference gait", "gait cycle from right heel strike, %", "angle, °");
     ANGLES.iter().enumerate().fold(chart, |chart, (column, name)| {
         let rows = reference.definition.angles_rad.iter().enumerate();
