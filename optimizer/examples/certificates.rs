@@ -54,8 +54,10 @@ fn print(certificate: &Certificate, all: bool) {
         );
         println!("   response to a change of speed: {:.3e} (other directions {:.1e})", map.speed_kept, map.speed_leak);
         println!(
-            "   gait to periodic motion: {:.1e}, residual there {:.1e} rad, rad/s",
-            map.fixed_point_distance, map.fixed_point_residual
+            "   gait to periodic motion: {:.1e} rad, {:.1e} rad/s, largest residual there {:.1e}",
+            map.fixed_point_distance.angle_rad,
+            map.fixed_point_distance.angular_velocity_rad_s,
+            map.fixed_point_residual
         );
     }
     if let Some(map) = &certificate.free_hip_return_map {

@@ -1,6 +1,6 @@
 //! Execution of gaits, simulated by a model other than the optimiser's: shares of simulated walks of 20 strides without a fall.
 //!
-//! `cargo run --release -p gait-optimizer --example execution -- [--walks 200] [--threads 2] [--training COUNT] [--gaits FILE...]`
+//! `cargo run --release -p gait-optimizer --example execution -- [--simulated-walks 200] [--threads 2] [--training COUNT] [--gaits FILE...]`
 //!
 //! Rows: the default gait of each subject and variant, the nearest to the reference among those of four initial guesses,
 //! the golden gaits, and the gaits of the files. With `--training`, instead the random actions of Table I on
@@ -100,7 +100,7 @@ fn row(name: &str, gait: Option<&Gait>) -> Result<(), Box<dyn Error>> {
         return Ok(());
     };
     let options = ExecutionOptions {
-        simulated_walks: argument("--walks", "200").parse()?,
+        number_of_simulated_walks: argument("--simulated-walks", "200").parse()?,
         threads: argument("--threads", "2").parse()?,
         ..ExecutionOptions::default()
     };

@@ -52,7 +52,7 @@ const STRIDES_BEFORE_PUSH: f64 = 3.2;
 #[serde(deny_unknown_fields, default)]
 pub struct ExecutionOptions {
     /// Number of simulated walks on each kind of ground, 1 to [`Self::MOST_SIMULATED_WALKS`].
-    pub simulated_walks: u32,
+    pub number_of_simulated_walks: u32,
     /// Strides of a complete walk, 1 to 1000.
     pub strides: u32,
     /// Largest height and depth of the plateaus of each ground, m; 0 to [`Self::HIGHEST_GROUND_M`].
@@ -65,7 +65,13 @@ pub struct ExecutionOptions {
 
 impl Default for ExecutionOptions {
     fn default() -> Self {
-        Self { simulated_walks: 50, strides: 20, ground_heights_m: vec![0.0, 0.005, 0.01], seed: 1, threads: 1 }
+        Self {
+            number_of_simulated_walks: 50,
+            strides: 20,
+            ground_heights_m: vec![0.0, 0.005, 0.01],
+            seed: 1,
+            threads: 1,
+        }
     }
 }
 
@@ -78,7 +84,7 @@ impl ExecutionOptions {
     /// Number of walks with random disturbances, over all grounds.
     pub fn random_walks(&self) -> u32 {
         let grounds = u32::try_from(self.ground_heights_m.len()).unwrap_or(u32::MAX);
-        self.simulated_walks.saturating_mul(grounds)
+        self.number_of_simulated_walks.saturating_mul(grounds)
     }
 
     /// Checks each option.
@@ -87,8 +93,8 @@ impl ExecutionOptions {
     /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
         ModelError::check_range(
-            "simulated_walks",
-            f64::from(self.simulated_walks),
+            "number_of_simulated_walks",
+            f64::from(self.number_of_simulated_walks),
             1.0,
             f64::from(Self::MOST_SIMULATED_WALKS),
         )?;
@@ -129,7 +135,8 @@ pub fn simulate(
     };
     let mut grounds = Vec::new();
     for &ground_m in &options.ground_heights_m {
-        let outcomes = in_parallel(options.simulated_walks, options.threads, cancel, &|number| walk(ground_m, number))?;
+        let outcomes =
+            in_parallel(options.number_of_simulated_walks, options.threads, cancel, &|number| walk(ground_m, number))?;
         if cancel.is_cancelled() {
             return Ok(None);
         }

@@ -71,6 +71,8 @@ answer = {"trial_a": trial, "trial_b": other, "answer": "a"}
 preference = call("POST", f"{v1}/studies/{study}/preferences", answer)["id"]
 noted = {"trial_a": other, "trial_b": third, "answer": "cannot_tell"}
 assessment = call("POST", f"{v1}/studies/{study}/assessments", noted)["id"]
+better = call("GET", f"{v1}/trials/{third}")["bounds"]
+suggestion = call("POST", f"{v1}/studies/{study}/suggestions", {"over": trial, "bounds": better})["id"]
 session = call("POST", f"{v1}/studies/{study}/lab-sessions", {"trial_a": trial, "trial_b": other})["id"]
 backup = call("POST", f"{v1}/backups")["id"]
 device = call("GET", f"{v1}/devices")["items"][0]["id"]
@@ -125,6 +127,7 @@ for pattern, value in [
     (r"/trials/\{id\}", trial),
     (r"/preferences/\{id\}", preference),
     (r"/assessments/\{id\}", assessment),
+    (r"/suggestions/\{id\}", suggestion),
     (r"/lab-sessions/\{id\}", session),
     (r"/backups/\{id\}", backup),
     (r"/jobs/\{id\}", f"certificate-{trial}"),

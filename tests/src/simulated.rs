@@ -14,7 +14,7 @@ use serde_json::json;
 pub fn report() -> ExecutionReport {
     let ground = |ground_height_m: f64, completed: u32, interval: [f64; 2]| {
         json!({
-            "ground_height_m": ground_height_m, "simulated_walks": 40, "completed": completed, "fell": 38 - completed, "halted": 2,
+            "ground_height_m": ground_height_m, "number_of_simulated_walks": 40, "completed": completed, "fell": 38 - completed, "halted": 2,
             "completed_share": f64::from(completed) / 40.0, "completed_share_interval": interval, "mean_strides": 12.3,
             "knee_saturated_share": 0.18, "ankle_saturated_share": 0.0, "knee_rate_limited_share": 0.28,
             "ankle_rate_limited_share": 0.14,
@@ -38,9 +38,15 @@ pub fn report() -> ExecutionReport {
 /// If the record cannot be written.
 pub async fn keep(store: &Store, trial: &Trial) {
     let program = Actor::program().as_str().to_owned();
-    let (simulated_walks, seed, report) = (40, 7, report());
-    let reported =
-        ExecutionReported { trial_id: trial.id, number: trial.number, simulated_walks, seed, program, report };
+    let (number_of_simulated_walks, seed, report) = (40, 7, report());
+    let reported = ExecutionReported {
+        trial_id: trial.id,
+        number: trial.number,
+        number_of_simulated_walks,
+        seed,
+        program,
+        report,
+    };
     let mut writer = store.write().await.unwrap();
     events::append(&mut writer, trial.study_id, REPORTED, &reported).await.unwrap();
     commit(writer).await.unwrap();

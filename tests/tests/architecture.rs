@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use gaitwright_tests::{imports, sources};
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// The source folders of the crates.
@@ -133,6 +134,17 @@ struct DerivingType<'a> {
     traits: Vec<&'a str>,
     name: &'a str,
     has_fields: bool,
+    /// The lines of its fields or variants.
+    body: Vec<&'a str>,
+}
+
+impl<'a> DerivingType<'a> {
+    /// The words of the types of its fields.
+    fn field_types(&self) -> Vec<&'a str> {
+        let code = self.body.iter().filter(|line| !line.trim_start().starts_with(['/', '#']));
+        let types = code.map(|line| line.split_once(": ").map_or(*line, |(_, of)| of));
+        types.flat_map(|of| of.split(|c: char| !c.is_ascii_alphanumeric())).collect()
+    }
 }
 
 /// The types of a source text that derive traits.
@@ -143,6 +155,11 @@ fn deriving_types(text: &str) -> Vec<DerivingType<'_>> {
         let item = ["struct ", "enum "].into_iter().filter_map(|kind| rest.find(kind)).min().unwrap();
         let item = &rest[item..];
         let (head, body) = item.split_at(item.find(['{', ';']).unwrap());
+        // Formatted items end with a brace that is not indented.
+        let all: Vec<&str> = match body.starts_with('{') {
+            true => body.lines().take_while(|line| *line != "}").skip(1).collect(),
+            false => vec![&head[head.find('(').unwrap_or(head.len())..]],
+        };
         let variants = body.lines().take_while(|line| line.trim() != "}").skip(1);
         let mut variants = variants.filter(|line| !line.trim_start().starts_with(['/', '#']));
         let has_fields = if head.starts_with("struct ") {
@@ -151,12 +168,13 @@ fn deriving_types(text: &str) -> Vec<DerivingType<'_>> {
             variants.any(|line| line.contains(['{', '(']))
         };
         let name = head.split(|c: char| c.is_whitespace() || c == '<' || c == '(').nth(1).unwrap();
-        types.push(DerivingType { traits: traits.split(',').map(str::trim).collect(), name, has_fields });
+        types.push(DerivingType { traits: traits.split(',').map(str::trim).collect(), name, has_fields, body: all });
     }
     types
 }
 
-/// Rows have fields. What the store reads back, such as the payload of an event, is deserialised as well.
+/// Rows have fields. What the store reads back, such as the payload of an event, is deserialised as well; it is served by no
+/// field and no body (`rows_of_the_record_are_not_served`).
 fn could_be_served(found: &DerivingType) -> bool {
     let derives = |name| found.traits.contains(&name);
     found.has_fields && (derives("ToSchema") || derives("Serialize") && !derives("Deserialize"))
@@ -222,6 +240,78 @@ fn rows_of_the_record_are_not_served() {
         }
     }
     assert!(bodies > 100, "{bodies}");
+
+    // Nor as a field of what is served or received.
+    let mut wire_types = 0;
+    for folder in ["server/http/src", "server/service/src"] {
+        for (file, text) in sources::below(folder) {
+            for found in deriving_types(&text).iter().filter(|found| found.traits.contains(&"ToSchema")) {
+                wire_types += 1;
+                let stored = found.field_types().into_iter().find(|word| documents.contains(word));
+                assert_eq!(stored, None, "{file}: {}", found.name);
+            }
+        }
+    }
+    assert!(wire_types > 150, "{wire_types}");
+}
+
+const KINDS: [&str; 4] = ["struct ", "enum ", "trait ", "type "];
+
+/// The name of each type and trait of product code, and whether clients see it.
+fn definitions(text: &str) -> Vec<(&str, bool)> {
+    let product = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+    let wire: HashSet<&str> = deriving_types(product)
+        .iter()
+        .filter(|found| found.traits.contains(&"ToSchema"))
+        .map(|found| found.name)
+        .collect();
+    let mut found = Vec::new();
+    for raw in product.lines() {
+        let mut line = raw.trim_start();
+        for visibility in ["pub ", "pub(crate) ", "pub(super) "] {
+            line = line.strip_prefix(visibility).unwrap_or(line);
+        }
+        if line.starts_with("pub(in ") {
+            line = line.split_once(") ").unwrap().1;
+        }
+        // An indented alias is that of a trait.
+        let kinds: &[&str] = if raw.starts_with(' ') { &KINDS[..3] } else { &KINDS };
+        let Some(rest) = kinds.iter().find_map(|kind| line.strip_prefix(kind)) else {
+            continue;
+        };
+        let name = rest.split(|c: char| !c.is_ascii_alphanumeric()).next().unwrap();
+        if name.starts_with(|c: char| c.is_ascii_uppercase()) {
+            found.push((name, wire.contains(name)));
+        }
+    }
+    found
+}
+
+/// A name means one thing. What clients see of a type can have its name.
+#[test]
+fn names_of_types_are_different() {
+    let examples = definitions(EXAMPLES);
+    assert_eq!(examples.iter().filter(|(_, wire)| *wire).count(), 3, "{examples:?}");
+    let (mut places, mut wire) = (HashMap::<String, Vec<String>>::new(), HashMap::<String, Vec<String>>::new());
+    for folder in CRATES {
+        for (file, text) in sources::below(folder) {
+            if file.ends_with("tests.rs")
+                || file.contains("tests/")
+                || folder == "server/src" && file.starts_with("bin/")
+            {
+                continue;
+            }
+            for (name, is_wire) in definitions(&text) {
+                let is_wire = folder == "server/http/src" && (is_wire || file.starts_with("resources/"));
+                let found = if is_wire { &mut wire } else { &mut places };
+                found.entry(name.to_owned()).or_default().push(format!("{folder}/{file}"));
+            }
+        }
+    }
+    assert!(places.len() > 500 && wire.len() > 100, "{} {}", places.len(), wire.len());
+    let mut repeated: Vec<_> = places.iter().chain(&wire).filter(|(_, files)| files.len() > 1).collect();
+    repeated.sort();
+    assert!(repeated.is_empty(), "{repeated:#?}");
 }
 
 const LIBRARIES: [&str; 3] = ["optimizer/nlp/src", "optimizer/src", "learner/src"];

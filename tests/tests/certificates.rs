@@ -226,21 +226,22 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     let before = page().await;
     assert!(before.contains("No simulated walks with this gait yet."), "{before}");
     for (wrong, field) in [
-        (json!({"simulated_walks": 0}), "simulated_walks"),
-        (json!({"simulated_walks": 1001}), "simulated_walks"),
+        (json!({"number_of_simulated_walks": 0}), "number_of_simulated_walks"),
+        (json!({"number_of_simulated_walks": 1001}), "number_of_simulated_walks"),
         (json!({"seed": -1}), "seed"),
     ] {
         let refused = service.post(&address, &wrong).await;
         assert!(refused.status.is_client_error() && refused.text.contains(field), "{}", refused.text);
     }
 
-    let found = simulated(&service, &address, &json!({"simulated_walks": 4, "seed": 3})).await;
+    let found = simulated(&service, &address, &json!({"number_of_simulated_walks": 4, "seed": 3})).await;
     let report = &found["report"];
     let gait = service.fetch(&format!("/api/v1/trials/{}/gait", trial.id)).await.text;
     std::fs::write(folder.path().join("gait.json"), gait).unwrap();
-    let printed = done(folder.path(), &["simulate", "gait.json", "--walks", "4", "--seed", "3", "--json"]);
+    let printed = done(folder.path(), &["simulate", "gait.json", "--simulated-walks", "4", "--seed", "3", "--json"]);
     assert_eq!(*report, serde_json::from_str::<Value>(&printed).unwrap());
-    let walks: Vec<&Value> = report["grounds"].as_array().unwrap().iter().map(|on| &on["simulated_walks"]).collect();
+    let walks: Vec<&Value> =
+        report["grounds"].as_array().unwrap().iter().map(|on| &on["number_of_simulated_walks"]).collect();
     assert_eq!(walks, [4, 4, 4]);
 
     // The page has the same without scripts, and the study page and the recommendation follow it.
@@ -258,9 +259,9 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     assert_eq!(recommended().await["execution_report"], *report);
 
     // The same simulated walks exist; others replace them as the newest report, and the record keeps both.
-    let again = service.post(&address, &json!({"simulated_walks": 4, "seed": 3})).await;
+    let again = service.post(&address, &json!({"number_of_simulated_walks": 4, "seed": 3})).await;
     assert_eq!((again.status, &again.json()["state"]), (StatusCode::OK, &json!("done")));
-    let other = simulated(&service, &address, &json!({"simulated_walks": 4, "seed": 4})).await;
+    let other = simulated(&service, &address, &json!({"number_of_simulated_walks": 4, "seed": 4})).await;
     assert_eq!((&other["report"]["seed"], other["report"]["grounds"] == report["grounds"]), (&json!(4), false));
     let audit = service.fetch("/api/v1/audit").await.text;
     assert_eq!(
@@ -272,7 +273,10 @@ async fn service_simulates_the_walks_that_the_command_line_simulates() {
     let events: Vec<_> = events.iter().filter(|event| event.kind == "execution_reported").collect();
     assert_eq!((events.len(), &events[0].payload["report"]), (2, report));
     let details = audit_trail(&service).await;
-    assert!(["passed", "failures", "simulated_walks"].iter().all(|name| details.contains(*name)), "{details:?}");
+    assert!(
+        ["passed", "failures", "number_of_simulated_walks"].iter().all(|name| details.contains(*name)),
+        "{details:?}"
+    );
     service.stop().await;
 }
 
@@ -289,7 +293,7 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
             tokio::time::sleep(Duration::from_millis(10)).await;
         }
     };
-    let long = json!({"simulated_walks": 1000, "seed": 1});
+    let long = json!({"number_of_simulated_walks": 1000, "seed": 1});
     assert_eq!(service.post(&address, &long).await.status, StatusCode::ACCEPTED);
     until(&service, "running").await;
     let listed = service.fetch("/api/v1/jobs?kind=execution_report").await.items();
@@ -300,7 +304,7 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
             && page.contains("<progress")
     );
     assert!(page.contains("followed_jobs.mjs") && !page.contains("/execution-report\""), "{page}");
-    let other = service.post(&address, &json!({"simulated_walks": 2})).await;
+    let other = service.post(&address, &json!({"number_of_simulated_walks": 2})).await;
     assert_eq!(other.status, StatusCode::CONFLICT, "{}", other.text);
     assert!(
         other.text.contains("(number of simulated walks: 1000, seed: 1) is already queued or running"),
@@ -312,7 +316,10 @@ async fn simulation_is_cancelled_and_a_requested_one_survives_a_restart() {
     until(&service, "cancelled").await;
     assert_eq!(service.fetch(&address).await.status, StatusCode::NOT_FOUND);
 
-    assert_eq!(service.post(&address, &json!({"simulated_walks": 1000, "seed": 2})).await.status, StatusCode::ACCEPTED);
+    assert_eq!(
+        service.post(&address, &json!({"number_of_simulated_walks": 1000, "seed": 2})).await.status,
+        StatusCode::ACCEPTED
+    );
     until(&service, "running").await;
     service.stop().await;
     let service = Service::start_certifying(&database, GaitSolver, GaitCertifier).await;

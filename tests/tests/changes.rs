@@ -42,7 +42,7 @@ const ELSEWHERE: [&str; 21] = [
     "relaxed_bound",
     "scheduled",
     "signed_by",
-    "simulated_walks",
+    "number_of_simulated_walks",
     "to_device",
     "trajectories",
     "trusted",
@@ -180,7 +180,9 @@ async fn every_operation_writes_exactly_one_row_of_the_audit_trail() {
 
     let better = json!({"over": trials[0].id, "bounds": {"a6": elsewhere(&trials[0])}});
     let suggest = format!("{api}/studies/{finished}/suggestions");
-    scene.one(done, "post /studies/{id}/suggestions", &suggest, better).await;
+    let suggested = scene.one(done, "post /studies/{id}/suggestions", &suggest, better).await;
+    let retract = format!("{api}/suggestions/{}/retract", text(&suggested["id"]));
+    scene.one(done, "post /suggestions/{id}/retract", &retract, json!({"reason": "r"})).await;
     // A job leaves one row for its request, and one when it is done.
     let before = rows(service).await;
     service.backed_up().await;

@@ -87,7 +87,7 @@ fn other_invalid_arguments_are_refused() {
     refused(&["solve", "--warm", "nowhere.json"], "Cannot read nowhere.json");
     refused(&["sweep", "--actions", "nowhere.csv", "--out", "x.csv"], "Cannot read nowhere.csv");
     refused(&["simulate", "nowhere.json"], "Cannot read nowhere.json");
-    refused(&["simulate", "nowhere.json", "--walks", "0"], "must be a whole number from 1 to 100000");
+    refused(&["simulate", "nowhere.json", "--simulated-walks", "0"], "must be a whole number from 1 to 100000");
     refused(&["simulate", "nowhere.json", "--ground", "-5"], "'--ground <MILLIMETRES>': must be a number from 0 to 50");
     refused(&["solve", "--height-m", "tall", "--body-mass-kg", "65"], "'--height-m <METRES>': must be a number");
     refused(&["emg", "nowhere.csv", "--order", "high"], "must be 2, 4, 6 or 8");

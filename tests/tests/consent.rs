@@ -153,6 +153,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         ("/trials/{id}", trials[0].id.to_string()),
         ("/jobs/{id}", format!("solve-{}", trials[0].id)),
         ("/preferences/{id}", preference.to_string()),
+        ("/suggestions/{id}", preference.to_string()),
         ("/assessments/{id}", assessment.clone()),
         ("/blind-pairs/{code}", code.clone()),
         ("/lab-sessions/{id}", session.clone()),
@@ -196,6 +197,7 @@ async fn withdrawal_stops_all_writes_and_exports() {
         (format!("/api/v1/studies/{human}/raters/unblind"), json!({"rater": "an anonymous visitor", "reason": "r"})),
         (format!("/api/v1/preferences/{preference}/retract"), json!({"reason": "r"})),
         (format!("/api/v1/preferences/{preference}/undo"), json!({})),
+        (format!("/api/v1/suggestions/{preference}/retract"), json!({"reason": "r"})),
     ] {
         let refused = service.post(&path, &body).await;
         assert_eq!(refused.status, StatusCode::CONFLICT, "{path}: {}", refused.text);

@@ -101,6 +101,7 @@ fn entry_point_of(operation: &str) -> Option<EntryPoint> {
             EntryPoint::None("decides about a report; `safety_review.rs` holds its rules")
         }
         "post /api/v1/preferences/{id}/retract"
+        | "post /api/v1/suggestions/{id}/retract"
         | "post /api/v1/assessments/{id}/retract"
         | "post /studies/{id}/retract"
         | "post /api/v1/lab-sessions/{id}/retract-answer"

@@ -749,9 +749,9 @@ async fn refused_user_and_token_forms_keep_the_input_and_show_the_error_at_its_f
     let taken = send("button=add_user&name=K1&role=administrator").await;
     is_page(&taken, StatusCode::CONFLICT, "A user named");
     for kept in [
-        "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"fault\"",
+        "name=\"name\" value=\"K1\" required maxlength=\"80\" autocomplete=\"off\" aria-invalid=\"true\" aria-describedby=\"refused\"",
         "value=\"administrator\" selected",
-        "id=\"fault\"",
+        "id=\"refused\"",
     ] {
         assert!(taken.text.contains(kept), "{kept}: {}", taken.text);
     }

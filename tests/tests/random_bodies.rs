@@ -99,12 +99,17 @@ impl Scene {
         self.id_of("/studies", body).await
     }
 
-    /// A preference or a note between the first two gaits, by somebody new.
+    /// A preference, a note or a suggestion about the first two gaits, by somebody new.
     async fn said(&mut self, what: &str) -> String {
         let (one, other) = (self.trials[0], self.trials[1]);
         let author = format!("author {}", self.number());
         let body = match what {
             "preferences" => json!({"trial_a": one, "trial_b": other, "answer": "a", "author": author}),
+            "suggestions" => {
+                let trials = self.service.trials(self.finished).await;
+                let bounds = trials.into_iter().find(|trial| trial.id == other).map(|trial| trial.action);
+                json!({"over": one, "bounds": bounds, "author": author})
+            }
             _ => json!({"trial_a": one, "trial_b": other, "answer": "cannot_tell", "author": author}),
         };
         self.id_of(&format!("/studies/{}/{what}", self.finished), body).await
@@ -168,6 +173,7 @@ impl Scene {
             }
             path if path.starts_with("/preferences/{id}") => self.said("preferences").await,
             path if path.starts_with("/assessments/{id}") => self.said("assessments").await,
+            path if path.starts_with("/suggestions/{id}") => self.said("suggestions").await,
             "/lab-sessions/{id}/emg-results" => {
                 let id = self.session(true).await;
                 let emg =

@@ -4,7 +4,7 @@
 
 use async_nats::jetstream::stream::{Config, RetentionPolicy};
 use gait_optimizer::{GaitProblem, SolveOptions, Subject};
-use gaitwright_service::workers::nats::{JetStream, ResultMessage, Worker, pack};
+use gaitwright_service::workers::nats::{JetStream, NatsWorker, ResultMessage, pack};
 use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Dispatch, EngineMessage, Evaluate};
 use gaitwright_store::TrialId;
 use gaitwright_tests::analytic::Analytic;
@@ -68,7 +68,7 @@ async fn worker_gives_up_a_refused_result_and_takes_the_next_job() {
     let engine = JetStream::connect(&broker.url(), QUEUE, 2, LEASE).await.unwrap();
     let solver = Arc::new(Analytic::slow(Duration::from_millis(2)));
     let evaluate = Arc::clone(&solver) as Arc<dyn Evaluate>;
-    let worker = Worker::connect(&broker.url(), QUEUE, "w".to_owned(), 1, LEASE, evaluate).await.unwrap();
+    let worker = NatsWorker::connect(&broker.url(), QUEUE, "w".to_owned(), 1, LEASE, evaluate).await.unwrap();
     let stop = CancellationToken::new();
     let running = tokio::spawn({
         let stop = stop.clone();

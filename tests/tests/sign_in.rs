@@ -6,7 +6,7 @@ use axum::body::Body;
 use axum::http::{Method, Request, StatusCode, header};
 use futures_util::{StreamExt, stream};
 use gaitwright_http::AccessState;
-use gaitwright_service::access::back_off::{self, Origin};
+use gaitwright_service::access::back_off::{self, AttemptOrigin};
 use gaitwright_service::access::session::SessionLimits;
 use gaitwright_service::access::sign_in;
 use gaitwright_service::access::tokens::{self as making, NewToken};
@@ -74,7 +74,7 @@ async fn abort_attempts(service: &Service, network: &str, names: impl Iterator<I
     let mut writer = service.store.write().await.unwrap();
     let at = now();
     for name in names {
-        let origin = Origin { network: network.to_owned(), site: None, known: None };
+        let origin = AttemptOrigin { network: network.to_owned(), site: None, known: None };
         let _ = back_off::begin(&mut writer, at, &name, origin).await.unwrap();
     }
     commit(writer).await.unwrap();
@@ -232,7 +232,7 @@ async fn guesses_from_many_networks_are_delayed_and_known_browsers_are_not() {
     let browser = cookie_of(&sign_in_from(&service, OWNER, None, "Ada", RIGHT).await, "gaitwright_browser");
     let mut writer = service.store.write().await.unwrap();
     for number in 1..=60 {
-        let origin = Origin { network: format!("198.51.100.{number}"), site: None, known: None };
+        let origin = AttemptOrigin { network: format!("198.51.100.{number}"), site: None, known: None };
         let _ = back_off::begin(&mut writer, at.plus_seconds(10 * (number - 60)), "Ada", origin).await.unwrap();
     }
     commit(writer).await.unwrap();
@@ -265,7 +265,7 @@ async fn cookie_of_a_known_browser_allows_no_more_guesses_than_many_networks() {
     let mut writer = service.store.write().await.unwrap();
     let (at, mut checked) = (now(), 0);
     for number in 1..=60 {
-        let origin = Origin { network: format!("198.51.100.{number}"), site: None, known: Some(user) };
+        let origin = AttemptOrigin { network: format!("198.51.100.{number}"), site: None, known: Some(user) };
         checked += u32::from(back_off::begin(&mut writer, at, "Ada", origin).await.unwrap().is_ok());
     }
     commit(writer).await.unwrap();
@@ -353,7 +353,7 @@ async fn audit_trail_shows_the_number_of_thirty_thousand_attempts() {
 
     // Counts that are a day old are deleted, and their number is written to the audit trail.
     let mut writer = service.store.write().await.unwrap();
-    let origin = Origin { network: "10.0.0.9".to_owned(), site: None, known: None };
+    let origin = AttemptOrigin { network: "10.0.0.9".to_owned(), site: None, known: None };
     let tomorrow = now().plus_seconds(25 * 3600);
     let _ = back_off::begin(&mut writer, tomorrow, "Ada", origin).await.unwrap();
     commit(writer).await.unwrap();

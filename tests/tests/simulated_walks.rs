@@ -67,11 +67,11 @@ async fn setting_is_off_by_default_and_checked() {
     let mut draft = body(&service, &json!({})).await;
     draft["start"] = json!(false);
     let study = service.post("/api/v1/studies", &draft).await.json();
-    let expected = json!({"effect": "none", "number": 50, "gait_rmse_tolerance_rad": 0.05, "least_mean_strides": 3.0});
+    let expected = json!({"effect": "none", "number_of_simulated_walks": 50, "gait_rmse_tolerance_rad": 0.05, "least_mean_strides": 3.0});
     assert_eq!(study["simulated_walks"], expected);
     for (change, field) in [
-        (json!({"simulated_walks": {"number": 0}}), "simulated_walks.number"),
-        (json!({"simulated_walks": {"number": 1001}}), "simulated_walks.number"),
+        (json!({"simulated_walks": {"number_of_simulated_walks": 0}}), "simulated_walks.number_of_simulated_walks"),
+        (json!({"simulated_walks": {"number_of_simulated_walks": 1001}}), "simulated_walks.number_of_simulated_walks"),
         (json!({"simulated_walks": {"gait_rmse_tolerance_rad": -0.1}}), "simulated_walks.gait_rmse_tolerance_rad"),
         (json!({"simulated_walks": {"least_mean_strides": 20.5}}), "simulated_walks.least_mean_strides"),
         (json!({"simulated_walks": {"effect": "certify"}}), "certify"),
@@ -93,7 +93,7 @@ async fn reports_follow_the_solves_of_a_study_that_they_do_not_change_even_after
     // Without jobs after solves, the requests stay on record.
     let service = Service::start_without_certificates(&database, GaitSolver).await;
     let (_, without) = finished(&service, &json!({})).await;
-    let (_, trials) = finished(&service, &json!({"effect": "report", "number": 1})).await;
+    let (_, trials) = finished(&service, &json!({"effect": "report", "number_of_simulated_walks": 1})).await;
     assert_eq!(results(&trials), results(&without));
     assert_eq!(reported(&service.store, &trials[0]).await, None);
     service.stop().await;
@@ -106,7 +106,7 @@ async fn reports_follow_the_solves_of_a_study_that_they_do_not_change_even_after
     }
     assert_eq!(reported(&service.store, &without[0]).await, None);
     // A new study gets its reports without a restart.
-    let (_, trials) = finished(&service, &json!({"effect": "report", "number": 1})).await;
+    let (_, trials) = finished(&service, &json!({"effect": "report", "number_of_simulated_walks": 1})).await;
     let last = trials.iter().rfind(|trial| trial.state == TrialState::Converged).unwrap();
     while reported(&service.store, last).await.is_none() {
         tokio::time::sleep(Duration::from_millis(20)).await;
@@ -118,7 +118,7 @@ async fn reports_follow_the_solves_of_a_study_that_they_do_not_change_even_after
 async fn mean_strides_decide_between_gaits_within_the_tolerance() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
-    let walks = json!({"effect": "tie_break", "number": 1, "gait_rmse_tolerance_rad": 10.0});
+    let walks = json!({"effect": "tie_break", "number_of_simulated_walks": 1, "gait_rmse_tolerance_rad": 10.0});
     let (study, trials) = finished(&service, &walks).await;
     let of = |id| trials.iter().find(|trial| trial.id == id).unwrap();
     let mut decided = 0;
@@ -148,7 +148,7 @@ async fn mean_strides_decide_between_gaits_within_the_tolerance() {
 async fn gaits_with_too_few_strides_are_labelled_and_never_recommended() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), GaitSolver, 1).await;
-    let walks = json!({"effect": "label", "number": 1, "least_mean_strides": 20.0});
+    let walks = json!({"effect": "label", "number_of_simulated_walks": 1, "least_mean_strides": 20.0});
     let (study, trials) = finished(&service, &walks).await;
     for trial in trials.iter().filter(|trial| trial.state.has_gait()) {
         let strides = trial.mean_strides.unwrap();
@@ -204,7 +204,7 @@ impl Evaluate for Counted {
 #[tokio::test]
 async fn result_waits_for_its_walks_and_does_not_depend_on_restarts_or_workers() {
     let folder = tempfile::tempdir().unwrap();
-    let walks = json!({"effect": "label", "number": 10, "least_mean_strides": 2.5});
+    let walks = json!({"effect": "label", "number_of_simulated_walks": 10, "least_mean_strides": 2.5});
     let service = Service::start(&folder.path().join("a.db"), GaitSolver, 3).await;
     let (_, expected) = finished(&service, &walks).await;
     service.stop().await;
@@ -239,14 +239,22 @@ fn command_tunes_with_simulated_walks() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         serde_json::from_slice::<Value>(&output.stdout).unwrap()
     };
-    let reported = tuned(&["--database", "a.db", "--simulated-walks", "report", "--walks", "2"]);
-    assert_eq!(reported["best_simulated_walks"]["simulated_walks"], json!(6), "{reported}");
+    let reported = tuned(&["--database", "a.db", "--simulated-walks-effect", "report", "--simulated-walks", "2"]);
+    assert_eq!(reported["best_simulated_walks"]["number_of_simulated_walks"], json!(6), "{reported}");
     assert!(reported["trials"][0]["mean_strides"].is_null(), "{reported}");
-    let labelled =
-        tuned(&["--database", "b.db", "--simulated-walks", "label", "--walks", "2", "--least-mean-strides", "20"]);
+    let labelled = tuned(&[
+        "--database",
+        "b.db",
+        "--simulated-walks-effect",
+        "label",
+        "--simulated-walks",
+        "2",
+        "--least-mean-strides",
+        "20",
+    ]);
     assert!(labelled["best_trial"].is_null() && labelled["trials"][0]["state"] == "not_executable", "{labelled}");
 
-    let alone = cli::run(BINARY, folder, &[&study[..], &["--database", "c.db", "--walks", "2"]].concat());
+    let alone = cli::run(BINARY, folder, &[&study[..], &["--database", "c.db", "--simulated-walks", "2"]].concat());
     let text = String::from_utf8_lossy(&alone.stderr);
-    assert!(alone.status.code() == Some(2) && text.contains("--simulated-walks"), "{text}");
+    assert!(alone.status.code() == Some(2) && text.contains("--simulated-walks-effect"), "{text}");
 }

@@ -40,6 +40,7 @@ impl Scene {
         };
         let preference = json!({"trial_a": one, "trial_b": two, "answer": "a"});
         let assessment = json!({"trial_a": one, "trial_b": two, "answer": "cannot_tell", "author": "somebody else"});
+        let suggestion = json!({"over": two, "bounds": trials[2].action});
         let user = made("/api/v1/users".to_owned(), json!({"name": "Ada", "role": "rater"})).await;
         let ids = BTreeMap::from([
             ("subjects", service.subject().await.to_string()),
@@ -48,6 +49,7 @@ impl Scene {
             ("jobs", format!("solve-{one}")),
             ("preferences", made(format!("{api}/preferences"), preference).await),
             ("assessments", made(format!("{api}/assessments"), assessment).await),
+            ("suggestions", made(format!("{api}/suggestions"), suggestion).await),
             ("lab-sessions", made(format!("{api}/lab-sessions"), json!({"trial_a": one, "trial_b": two})).await),
             ("users", user),
             ("study-members", made(format!("{api}/members"), json!({"kind": "user", "name": "Ada"})).await),

@@ -66,6 +66,8 @@ impl Closed {
         let assessment = post(&service, &admin, &format!("{api}/assessments"), &assessment).await;
         let pair = json!({"trial_a": a, "trial_b": b, "answer": "a"});
         let preference = post(&service, &admin, &format!("{api}/preferences"), &pair).await;
+        let suggestion = json!({"over": b, "bounds": gaits[2].action});
+        let suggestion = post(&service, &admin, &format!("{api}/suggestions"), &suggestion).await;
         let session = json!({"trial_a": a, "trial_b": b});
         let session = post(&service, &admin, &format!("{api}/lab-sessions"), &session).await;
         let session = session["id"].as_str().unwrap().to_owned();
@@ -89,6 +91,7 @@ impl Closed {
             ("jobs", format!("solve-{a}")),
             ("preferences", id(&preference)),
             ("assessments", id(&assessment)),
+            ("suggestions", id(&suggestion)),
             ("lab-sessions", session.clone()),
             ("lab", session),
             ("measurement-files", id(&brought)),

@@ -52,18 +52,36 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
     let given = service.post(&path, &new).await;
     assert_eq!(given.status, StatusCode::CREATED, "{}", given.text);
     let given = given.json();
-    let suggested = ActionIndex(given["content"]["suggested"].as_u64().unwrap());
     let mut expected = plan.search_space.values(trial.action_index);
     expected[5] = other;
-    assert_eq!(plan.search_space.values(suggested), expected);
+    let names = plan.search_space.dimensions().iter().map(|dimension| dimension.name.clone());
+    let bounds: serde_json::Map<_, _> = names.zip(expected.iter().map(|value| json!(value))).collect();
+    assert_eq!((&given["bounds"], &given["over"]), (&json!(bounds), &json!(trial.id)));
+    let is_suggested = |action: &ActionIndex| plan.search_space.values(*action) == expected;
+    let suggested = (0..plan.search_space.len()).map(ActionIndex).find(is_suggested).unwrap();
     let after = learner_feedback(&service, study).await;
     assert_eq!(after[before.len()..], [Feedback::Suggestion { suggested, over: trial.action_index }]);
     assert_eq!(service.fetch(&path).await.items()[0]["id"], given["id"]);
     let answers = service.fetch(&format!("/api/v1/studies/{study}/preferences")).await.text;
     assert!(!answers.contains("suggestion"), "{answers}");
 
-    let retract = format!("/api/v1/preferences/{}/retract", given["id"].as_str().unwrap());
+    // A suggestion is not a preference, nor the other way round.
+    let id = given["id"].as_str().unwrap();
+    assert_eq!(service.fetch(&format!("/api/v1/suggestions/{id}")).await.json(), given);
+    assert_eq!(service.fetch(&format!("/api/v1/preferences/{id}")).await.status, StatusCode::NOT_FOUND);
+    let preference = service.feedback(study).await[0].id;
+    for wrong in [
+        format!("preferences/{id}/retract"),
+        format!("preferences/{id}/undo"),
+        format!("suggestions/{preference}/retract"),
+    ] {
+        let body = if wrong.ends_with("undo") { json!({}) } else { json!({"reason": "mistyped"}) };
+        assert_eq!(service.post(&format!("/api/v1/{wrong}"), &body).await.status, StatusCode::NOT_FOUND, "{wrong}");
+    }
+    assert_eq!(service.fetch(&format!("/api/v1/suggestions/{preference}")).await.status, StatusCode::NOT_FOUND);
+    let retract = format!("/api/v1/suggestions/{id}/retract");
     assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
+    assert_eq!(service.post(&retract, &json!({"reason": "again"})).await.status, StatusCode::CONFLICT);
     assert_eq!(learner_feedback(&service, study).await, before);
     assert_eq!(service.fetch(&path).await.items()[0]["retraction"]["reason"], "mistyped");
     service.stop().await;
@@ -94,7 +112,7 @@ async fn suggestion_counts_once_for_each_person_and_not_besides_their_answer() {
     assert_eq!(prefer("ann").await.status, conflict, "the contrary as a preference");
     assert_eq!(suggest(one, three, "ann").await.status, created, "another comparison");
     assert_eq!(suggest(one, two, "ben").await.status, created, "another person");
-    let retract = format!("/api/v1/preferences/{}/retract", first.json()["id"].as_str().unwrap());
+    let retract = format!("/api/v1/suggestions/{}/retract", first.json()["id"].as_str().unwrap());
     assert_eq!(service.post(&retract, &json!({"reason": "mistyped"})).await.status, StatusCode::OK);
     assert_eq!(prefer("ann").await.status, created);
     assert_eq!(suggest(one, two, "ann").await.status, conflict, "against the own preference");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A retired word and the word of the glossary. It counts wherever no letter, digit or underscore precedes or follows it.
-const RETIRED: [(&str, &str); 58] = [
+const RETIRED: [(&str, &str); 59] = [
     ("basin", "local optimum"),
     ("belief", "analysis, posterior"),
     ("beliefs", "analyses, posteriors"),
@@ -42,6 +42,7 @@ const RETIRED: [(&str, &str); 58] = [
     ("GaitSimulated", "ExecutionReported"),
     ("trial.simulate", "trial.report_execution"),
     ("WalksOnGround", "SimulatedWalksOnGround"),
+    ("walks_number", "number_of_simulated_walks"),
     ("WalkerFigure", "GaitWalker"),
     ("gait-figure", "gait-walker"),
     ("BlindFigure", "BlindStickFigure"),

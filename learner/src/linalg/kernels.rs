@@ -21,8 +21,8 @@ macro_rules! kernels {
         $($(#[$doc])*
         $visibility fn $name<'a>($($argument: $type),*) $(-> $result)? {
             #[allow(non_camel_case_types)]
-            struct Kernel<'a> { $($argument: $type,)* }
-            impl<'a> WithSimd for Kernel<'a> {
+            struct DispatchedKernel<'a> { $($argument: $type,)* }
+            impl<'a> WithSimd for DispatchedKernel<'a> {
                 type Output = kernels!(@output $($result)?);
                 #[inline(always)]
                 fn with_simd<S: Simd>(self, _: S) -> Self::Output {
@@ -30,7 +30,7 @@ macro_rules! kernels {
                     $body
                 }
             }
-            Arch::new().dispatch(Kernel { $($argument),* })
+            Arch::new().dispatch(DispatchedKernel { $($argument),* })
         })*
     };
     (@output) => { () };

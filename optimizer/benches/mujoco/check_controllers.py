@@ -42,7 +42,7 @@ class ForceLawPlant(Plant):
 def main() -> None:
     program = sys.argv[1]
     for gait_file in map(Path, sys.argv[2:]):
-        command = [program, "simulate", str(gait_file), "--walks", "1", "--ground", "0", "--json"]
+        command = [program, "simulate", str(gait_file), "--simulated-walks", "1", "--ground", "0", "--json"]
         gait = read_gait(gait_file)
         report = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
         for rung in report["strides_by_yield"]:

@@ -1,6 +1,6 @@
 """Walks with the same gaits in MuJoCo and in `gaitwright simulate`, and how well both agree on the order of the gaits.
 
-    python compare_plants.py PROGRAM FOLDER [--contact documented] [--grounds 0 5] [--walks 10]
+    python compare_plants.py PROGRAM FOLDER [--contact documented] [--grounds 0 5] [--simulated-walks 10]
 
 Walks are kept in FOLDER/walks: the command continues after a stop, and more walks in MuJoCo extend those that are there.
 """
@@ -83,7 +83,7 @@ def in_gaitwright(program: str, file: Path, ground_mm: int, walks: int) -> OnGro
     path = file.parent / "walks" / f"{file.stem}-gaitwright-{ground_mm}-{walks}.json"
     if path.exists():
         return OnGround(**json.loads(path.read_text()))
-    options = ["--walks", str(walks), "--ground", str(ground_mm), "--seed", str(SEED), "--json"]
+    options = ["--simulated-walks", str(walks), "--ground", str(ground_mm), "--seed", str(SEED), "--json"]
     result = subprocess.run([program, "simulate", str(file), *options], capture_output=True, text=True, check=True)
     [ground] = json.loads(result.stdout)["grounds"]
     found = OnGround(ground["mean_strides"], ground["completed_share"])
@@ -132,21 +132,21 @@ def main() -> None:
     arguments.add_argument("program")
     arguments.add_argument("folder", type=Path)
     arguments.add_argument("--contact", choices=CONTACTS, default="documented")
-    arguments.add_argument("--walks", type=int, default=10)
-    arguments.add_argument("--walks-in-gaitwright", type=int, default=50)
+    arguments.add_argument("--simulated-walks", type=int, default=10)
+    arguments.add_argument("--simulated-walks-in-gaitwright", type=int, default=50)
     arguments.add_argument("--grounds", type=int, nargs="+", default=[0, 5])
     given = arguments.parse_args()
     files, contact, grounds_mm = distinct(given.folder), CONTACTS[given.contact], given.grounds
 
     def mujoco_walks(file: Path, mm: int) -> OnGround:
-        return in_mujoco(file, contact, given.contact, mm, given.walks)
+        return in_mujoco(file, contact, given.contact, mm, given.simulated_walks)
 
     def gaitwright_walks(file: Path, mm: int) -> OnGround:
-        return in_gaitwright(given.program, file, mm, given.walks_in_gaitwright)
+        return in_gaitwright(given.program, file, mm, given.simulated_walks_in_gaitwright)
 
     mujoco = of_all(files, grounds_mm, "MuJoCo", mujoco_walks)
     gaitwright = of_all(files, grounds_mm, "Gaitwright", gaitwright_walks)
-    print(f"{len(files)} gaits; {given.walks_in_gaitwright} walks in Gaitwright, {given.walks} in MuJoCo")
+    print(f"{len(files)} gaits; {given.simulated_walks_in_gaitwright} simulated walks in Gaitwright, {given.simulated_walks} in MuJoCo")
     print_table(grounds_mm, gaitwright, mujoco)
     print_correlations(grounds_mm, gaitwright, mujoco)
 

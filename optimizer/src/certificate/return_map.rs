@@ -38,15 +38,42 @@ impl FloquetMultiplier {
     }
 }
 
+/// Largest differences between the first state of the gait and the fixed point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FixedPointDistance {
+    /// In the height of the hip, m.
+    pub height_m: f64,
+    /// In an angle, rad.
+    pub angle_rad: f64,
+    /// In a velocity of the hip, m/s.
+    pub velocity_m_s: f64,
+    /// In an angular velocity, rad/s.
+    pub angular_velocity_rad_s: f64,
+}
+
+impl FixedPointDistance {
+    /// The section has the height of the hip, seven angles, two velocities of the hip and seven angular velocities.
+    fn between(a: &Section, b: &Section) -> Self {
+        let difference = a - b;
+        let largest = |first, number| difference.rows(first, number).amax();
+        Self {
+            height_m: largest(0, 1),
+            angle_rad: largest(1, 7),
+            velocity_m_s: largest(8, 2),
+            angular_velocity_rad_s: largest(10, 7),
+        }
+    }
+}
+
 /// Fixed point and multipliers of the stride-to-stride map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReturnMap {
-    /// Largest change of the state over one stride from the first state of the gait, rad and rad/s.
+    /// Largest change of a component of the state (m, rad, m/s or rad/s) over one stride from the first state of the gait.
     pub gait_residual: f64,
     /// The same from the fixed point of the closed loop.
     pub fixed_point_residual: f64,
-    /// Largest distance between the first state of the gait and the fixed point, rad and rad/s.
-    pub fixed_point_distance: f64,
+    /// Distance between the first state of the gait and the fixed point.
+    pub fixed_point_distance: FixedPointDistance,
     /// Multipliers by variational equations and saltation, largest modulus first.
     pub multipliers: Vec<FloquetMultiplier>,
     /// Largest modulus of these multipliers.
@@ -148,7 +175,7 @@ pub(super) fn return_map(walker: &HybridWalker<'_>, start: &State) -> Result<(St
         ReturnMap {
             gait_residual: residual(start)?,
             fixed_point_residual: residual(&fixed)?,
-            fixed_point_distance: (section(&fixed) - section(start)).amax(),
+            fixed_point_distance: FixedPointDistance::between(&section(&fixed), &section(start)),
             largest: multipliers_found.first().map_or(0.0, FloquetMultiplier::modulus),
             largest_by_differences: by_differences,
             differences_resolve: (by_differences - less_fine).abs(),

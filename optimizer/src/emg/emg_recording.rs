@@ -6,8 +6,10 @@ use crate::opensim_reading::StorageFile;
 use crate::reference::{SHORTEST_CONTACT_S, SHORTEST_SWING_S, contacts, given};
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 
-/// Allowed sampling rates of a file without a time column, Hz.
-const RATE_RANGE_HZ: (f64, f64) = (100.0, 20_000.0);
+/// Lowest sampling rate of a file without a time column, Hz.
+const LOWEST_RATE_HZ: f64 = 100.0;
+/// Highest sampling rate of a file without a time column, Hz. At this rate filter settings have their widest ranges.
+pub const HIGHEST_RATE_HZ: f64 = 20_000.0;
 
 /// Raw signals of several channels with common times.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,5 +154,5 @@ impl EmgRecording {
 }
 
 fn checked_rate(rate_hz: f64) -> Result<f64, ModelError> {
-    ModelError::check_range("rate_hz", rate_hz, RATE_RANGE_HZ.0, RATE_RANGE_HZ.1)
+    ModelError::check_range("rate_hz", rate_hz, LOWEST_RATE_HZ, HIGHEST_RATE_HZ)
 }

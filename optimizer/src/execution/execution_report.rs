@@ -12,7 +12,7 @@ pub struct SimulatedWalksOnGround {
     /// Largest height of bumps and depth of dips in the ground, m.
     pub ground_height_m: f64,
     /// Number of simulated walks.
-    pub simulated_walks: u32,
+    pub number_of_simulated_walks: u32,
     /// Walks that completed all strides.
     pub completed: u32,
     /// Walks that ended with a fall.
@@ -78,37 +78,38 @@ pub struct ExecutionReport {
 impl ExecutionReport {
     /// Mean number of completed strides, over all randomly disturbed walks; 0 without any.
     pub fn mean_strides(&self) -> f64 {
-        let strides: f64 = self.grounds.iter().map(|on| on.mean_strides * f64::from(on.simulated_walks)).sum();
-        let walks: f64 = self.grounds.iter().map(|on| f64::from(on.simulated_walks)).sum();
+        let strides: f64 =
+            self.grounds.iter().map(|on| on.mean_strides * f64::from(on.number_of_simulated_walks)).sum();
+        let walks: f64 = self.grounds.iter().map(|on| f64::from(on.number_of_simulated_walks)).sum();
         if walks > 0.0 { strides / walks } else { 0.0 }
     }
 
     /// Number of complete walks and of all walks, randomly disturbed.
     pub fn completed_of_all(&self) -> (u32, u32) {
         let sum = |count: fn(&SimulatedWalksOnGround) -> u32| self.grounds.iter().map(count).sum();
-        (sum(|on| on.completed), sum(|on| on.simulated_walks))
+        (sum(|on| on.completed), sum(|on| on.number_of_simulated_walks))
     }
 }
 
 impl SimulatedWalksOnGround {
     pub(super) fn of(ground_height_m: f64, outcomes: &[WalkOutcome]) -> Self {
         let ended = |end: WalkEnd| u32::try_from(outcomes.iter().filter(|o| o.end == end).count()).unwrap_or(u32::MAX);
-        let simulated_walks = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
+        let number_of_simulated_walks = u32::try_from(outcomes.len()).unwrap_or(u32::MAX);
         let periods = outcomes.iter().map(|o| o.periods).sum::<u64>().max(1);
         let share =
             |count: &dyn Fn(&WalkOutcome) -> u64| outcomes.iter().map(count).sum::<u64>() as f64 / periods as f64;
         let completed = ended(WalkEnd::Completed);
-        let (low, high) = wilson_interval(completed, simulated_walks);
+        let (low, high) = wilson_interval(completed, number_of_simulated_walks);
         Self {
             ground_height_m,
-            simulated_walks,
+            number_of_simulated_walks,
             completed,
             fell: ended(WalkEnd::Fell),
             halted: ended(WalkEnd::Halted),
-            completed_share: f64::from(completed) / f64::from(simulated_walks.max(1)),
+            completed_share: f64::from(completed) / f64::from(number_of_simulated_walks.max(1)),
             completed_share_interval: [low, high],
             mean_strides: outcomes.iter().map(|o| f64::from(o.strides)).sum::<f64>()
-                / f64::from(simulated_walks.max(1)),
+                / f64::from(number_of_simulated_walks.max(1)),
             knee_saturated_share: share(&|o| o.saturated[0]),
             ankle_saturated_share: share(&|o| o.saturated[1]),
             knee_rate_limited_share: share(&|o| o.rate_limited[0]),

@@ -18,7 +18,14 @@ impl ExecutionReport {
         let mut grounds: Vec<String> = self
             .grounds
             .iter()
-            .map(|on| format!("{} of {} simulated walks on {}", on.completed, on.simulated_walks, on.ground_in_words()))
+            .map(|on| {
+                format!(
+                    "{} of {} simulated walks on {}",
+                    on.completed,
+                    on.number_of_simulated_walks,
+                    on.ground_in_words()
+                )
+            })
             .collect();
         let strides = if self.strides == 1 { "1 stride".to_owned() } else { format!("{} strides", self.strides) };
         match (grounds.pop(), grounds.is_empty()) {

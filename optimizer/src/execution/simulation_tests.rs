@@ -119,7 +119,8 @@ fn walk_with_a_push_beyond_every_remedy_is_a_fall() {
 fn report_does_not_depend_on_threads_and_depends_on_the_seed() {
     let gait = walkable_gait();
     let report = |threads: usize, seed: u64| {
-        let options = ExecutionOptions { simulated_walks: 6, strides: 4, seed, threads, ..ExecutionOptions::default() };
+        let options =
+            ExecutionOptions { number_of_simulated_walks: 6, strides: 4, seed, threads, ..ExecutionOptions::default() };
         let done = AtomicU32::new(0);
         let report = simulate(&gait, &options, &done, &CancelToken::new()).unwrap().unwrap();
         assert_eq!((done.into_inner(), options.random_walks()), (18, 18));
@@ -145,7 +146,7 @@ fn cancelled_simulation_has_no_report() {
 
 #[test]
 fn sentence_counts_the_complete_walks_of_each_ground() {
-    let options = ExecutionOptions { simulated_walks: 2, strides: 1, ..ExecutionOptions::default() };
+    let options = ExecutionOptions { number_of_simulated_walks: 2, strides: 1, ..ExecutionOptions::default() };
     let report = simulate(&walkable_gait(), &options, &AtomicU32::new(0), &CancelToken::new()).unwrap().unwrap();
     let [level, low, high] = [0, 1, 2].map(|ground| report.grounds[ground].completed);
     let expected = format!(
@@ -187,7 +188,8 @@ fn body_masses_are_spread_over_the_range_of_the_model() {
 fn options_out_of_range_are_refused_by_name() {
     let refused = |options: ExecutionOptions| options.validate().unwrap_err().to_string();
     assert!(
-        refused(ExecutionOptions { simulated_walks: 0, ..ExecutionOptions::default() }).starts_with("simulated_walks")
+        refused(ExecutionOptions { number_of_simulated_walks: 0, ..ExecutionOptions::default() })
+            .starts_with("number_of_simulated_walks")
     );
     assert!(refused(ExecutionOptions { threads: 0, ..ExecutionOptions::default() }).starts_with("threads"));
     let heights = ExecutionOptions { ground_heights_m: vec![f64::NAN], ..ExecutionOptions::default() };

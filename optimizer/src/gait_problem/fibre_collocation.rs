@@ -1,6 +1,6 @@
 //! Rows of C8: Hermite-Simpson integration of fibre velocities to fibre lengths, in optimal fibre lengths.
 
-use super::hermite_simpson::{SLOPE, STATE};
+use super::hermite_simpson::{self, SLOPE, STATE};
 use super::program_data::{DomainContext, GaitProgram};
 use super::rows::DomainRows;
 use super::sparse_entries::Entries;
@@ -13,14 +13,12 @@ pub(super) fn values(program: &GaitProgram, context: &DomainContext<'_>, rows: &
     let h = context.duration / layout.intervals as f64;
     for interval in 0..layout.intervals {
         for m in 0..MUSCLE_COUNT {
-            for kind in 0..2 {
-                let mut sum = 0.0;
-                for i in 0..3 {
-                    let p = layout.point(2 * interval + i);
-                    sum += STATE[kind][i] * program.layout.value(x, p + layout.fibre_length() + m)
-                        + h * SLOPE[kind][i] * program.layout.value(x, p + layout.fibre_velocity() + m);
-                }
-                g[first + 2 * MUSCLE_COUNT * interval + MUSCLE_COUNT * kind + m] = sum;
+            let at_nodes = |first: usize| {
+                std::array::from_fn(|i| program.layout.value(x, layout.point(2 * interval + i) + first + m))
+            };
+            let rows = hermite_simpson::values(h, at_nodes(layout.fibre_length()), at_nodes(layout.fibre_velocity()));
+            for (kind, value) in rows.into_iter().enumerate() {
+                g[first + 2 * MUSCLE_COUNT * interval + MUSCLE_COUNT * kind + m] = value;
             }
         }
     }

@@ -3,7 +3,7 @@
 //! In each interval of length h = T/N with nodes 0, m and 1, `z_m = (z_0 + z_1)/2 + h/8 (f_0 - f_1)` and `z_1 = z_0 +
 //! h/6 (f_0 + 4 f_m + f_1)` for (z, f) = (dp, dp_dot) and (dp_dot, dp_ddot). The phase limit pb is dp at the last node.
 
-use super::hermite_simpson::{SLOPE, STATE};
+use super::hermite_simpson::{self, SLOPE, STATE};
 use super::layout::{Q, QD, QDD};
 use super::program_data::{DomainContext, GaitProgram};
 use super::rows::DomainRows;
@@ -21,10 +21,8 @@ pub(super) fn values(program: &GaitProgram, context: &DomainContext<'_>, rows: &
             });
             for order in 0..2 {
                 let row = first + 4 * interval + 2 * order;
-                let (z0, zm, z1) = (z[0][order], z[1][order], z[2][order]);
-                let (f0, fm, f1) = (z[0][order + 1], z[1][order + 1], z[2][order + 1]);
-                g[row] = zm - 0.5 * (z0 + z1) - h / 8.0 * (f0 - f1);
-                g[row + 1] = z1 - z0 - h / 6.0 * (f0 + 4.0 * fm + f1);
+                let rows = hermite_simpson::values(h, z.map(|z| z[order]), z.map(|z| z[order + 1]));
+                g[row..row + 2].copy_from_slice(&rows);
             }
         }
     }

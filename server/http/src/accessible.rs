@@ -49,7 +49,7 @@ macro_rules! of_study {
 
 of_study!(StudyId, "study", async |_: &mut Connection, id: StudyId| StoreResult::Ok(id));
 of_study!(TrialId, "trial", async |db: &mut Connection, id| StoreResult::Ok(trials::get(db, id).await?.study_id));
-of_study!(FeedbackId, "preference", async |db: &mut Connection, id| StoreResult::Ok(
+of_study!(FeedbackId, "preference or suggestion", async |db: &mut Connection, id| StoreResult::Ok(
     feedback::get(db, id).await?.study_id
 ));
 of_study!(AssessmentId, "assessment", async |db: &mut Connection, id| StoreResult::Ok(

@@ -3,6 +3,7 @@
 
 use super::{openapi, query_string};
 use crate::problem_details::Refusal;
+use crate::saved_as::{self, SavedByBrowser};
 use axum::extract::{MatchedPath, Request};
 use axum::http::Method;
 use axum::middleware::Next;
@@ -13,9 +14,9 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 /// Names of the query parameters, by method in small letters and path.
-type Described = HashMap<(String, String), Vec<String>>;
+type QueryParameters = HashMap<(String, String), Vec<String>>;
 
-static DESCRIBED: LazyLock<Result<Described, String>> =
+static DESCRIBED: LazyLock<Result<QueryParameters, String>> =
     LazyLock::new(|| openapi::value().map(|document| described(&document)).map_err(|error| error.to_string()));
 
 /// Checks the query of a request to an operation.
@@ -24,20 +25,23 @@ pub(super) async fn check(request: Request, next: Next) -> Result<Response, Refu
     let method = if request.method() == Method::HEAD { &Method::GET } else { request.method() };
     let path = request.extensions().get::<MatchedPath>().map_or("", MatchedPath::as_str);
     // An operation that is not described has a method that the path does not accept.
-    if let (Some(query), Some(known)) =
-        (request.uri().query(), described.get(&(method.as_str().to_lowercase(), path.to_owned())))
-    {
-        for (name, value) in query_string::pairs(query)? {
+    if let Some(known) = described.get(&(method.as_str().to_lowercase(), path.to_owned())) {
+        let unknown = |name: &str, value| query_string::unknown(name, value, known.iter().map(String::as_str));
+        for (name, value) in query_string::pairs(request.uri().query().unwrap_or_default())? {
             if !known.contains(&name) {
-                return Err(query_string::unknown(&name, Some(&value), known.iter().map(String::as_str)).into());
+                return Err(unknown(&name, Some(&value)).into());
             }
+        }
+        let is_saved = request.extensions().get::<SavedByBrowser>().is_some();
+        if is_saved && !known.iter().any(|name| name == saved_as::PARAMETER) {
+            return Err(unknown(saved_as::PARAMETER, None).into());
         }
     }
     Ok(next.run(request).await)
 }
 
-fn described(document: &Value) -> Described {
-    let mut all = Described::new();
+fn described(document: &Value) -> QueryParameters {
+    let mut all = QueryParameters::new();
     for (path, item) in document["paths"].as_object().into_iter().flatten() {
         for (method, operation) in item.as_object().into_iter().flatten() {
             let parameters = operation["parameters"].as_array().into_iter().flatten();

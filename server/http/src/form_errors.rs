@@ -8,41 +8,8 @@ use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::TrialId;
 use serde_json::Value;
 
-/// Labels of fields, the same on every form that has no labels of its own.
-const LABELS: &[(&str, &str)] = &[
-    ("pseudonym", "Pseudonym"),
-    ("height_m", "Height, m"),
-    ("body_mass_kg", "Body mass, kg"),
-    ("notes", "Notes"),
-    ("note", "Note"),
-    ("reason", "Reason"),
-    ("author", "Your name or code"),
-    ("answer", "Answer"),
-    ("name", "Name"),
-    ("who", "User or token"),
-    ("password", "New password"),
-    ("walk", "Walk"),
-    ("recording", "File contents"),
-    ("rate_hz", "Sampling rate, Hz"),
-    ("channels", "Channel columns"),
-    ("rejected_strides", "Rejected strides"),
-    ("file_name", "File name"),
-    ("heel_strikes_s", "Right heel strikes, s"),
-    ("heel_strike_column", "Heel strike column"),
-    ("heel_strike_threshold", "Contact threshold"),
-    ("force_column", "Column of the vertical force under the right foot"),
-    ("unit", "Angle unit of an OpenSim file"),
-    ("cutoff_hz", "Low-pass cut-off, Hz"),
-    ("band_low_hz", "Band-pass from, Hz"),
-    ("band_high_hz", "Band-pass to, Hz"),
-    ("envelope_hz", "Low-pass cut-off, Hz"),
-    ("order", "Filter order"),
-    ("simulated_walks", "Number of simulated walks on each kind of ground"),
-    ("seed", "Seed"),
-    ("number_of_trials", "Number of trials"),
-    ("form", "Signed consent form"),
-    ("rater", "Rater"),
-];
+/// Name and label of each field of a form, in its order.
+pub(crate) type FieldLabels = &'static [(&'static str, &'static str)];
 
 /// The refusal of a field that the form does not have.
 pub(crate) fn unknown_field(name: &str) -> FieldError {
@@ -74,11 +41,6 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
     near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
 }
 
-/// A refusal under the label that its form has for the field, or else under the common one.
-pub(crate) fn of_labelled(label: Option<&str>, fault: &FieldError) -> String {
-    label.map_or_else(|| labelled(fault, &[]), |label| of_field(label, fault))
-}
-
 /// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
 fn near_miss(fault: &FieldError) -> Option<String> {
     let number = match fault.value.as_ref()? {
@@ -106,28 +68,18 @@ fn near_miss(fault: &FieldError) -> Option<String> {
     Some(with_unit(meant, unit))
 }
 
-/// The sentence of an error, with the label of the refused field: from `labels`, or else the common one.
-pub(crate) fn of_form(error: &Error, labels: &[(&str, &str)]) -> String {
+/// The sentence of an error, with the label of the refused field.
+pub(crate) fn of_form(error: &Error, labels: FieldLabels) -> String {
     match error {
         Error::Invalid(fault) => labelled(fault, labels),
         _ => error.to_string(),
     }
 }
 
-/// The sentence of an error, with the common label of the refused field.
-pub(crate) fn in_words(error: &Error) -> String {
-    of_form(error, &[])
-}
-
-/// The same refusal, with the common label of its field.
-pub(crate) fn with_label(fault: FieldError) -> FieldError {
-    FieldError { message: labelled(&fault, &[]), ..fault }
-}
-
-fn labelled(fault: &FieldError, labels: &[(&str, &str)]) -> String {
+fn labelled(fault: &FieldError, labels: FieldLabels) -> String {
     // A form shows a field of a part of the request, such as `reading.rate_hz`, without the part.
     let name = fault.field.rsplit('.').next().unwrap_or_default();
-    let found = labels.iter().chain(LABELS).find(|(field, _)| *field == name);
+    let found = labels.iter().find(|(field, _)| *field == name);
     found.map_or_else(|| fault.message.clone(), |(_, label)| of_field(label, fault))
 }
 
@@ -135,12 +87,14 @@ fn labelled(fault: &FieldError, labels: &[(&str, &str)]) -> String {
 mod tests {
     use super::*;
 
+    const FILE: FieldLabels = &[("recording", "File contents")];
+
     #[test]
     fn sentences_about_files_begin_with_the_label_of_the_field() {
         let fault = FieldError::in_words("recording", "recording, line 1: the first column is \"t\"");
-        assert_eq!(labelled(&fault, &[]), "File contents, line 1: the first column is \"t\"");
+        assert_eq!(labelled(&fault, FILE), "File contents, line 1: the first column is \"t\"");
         let fault = FieldError::in_words("recording", "recording: column \"RF_L\" is missing");
-        assert_eq!(labelled(&fault, &[]), "File contents: column \"RF_L\" is missing");
+        assert_eq!(labelled(&fault, FILE), "File contents: column \"RF_L\" is missing");
     }
 
     #[test]

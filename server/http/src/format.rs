@@ -101,7 +101,8 @@ pub(crate) fn answer_source(source: AnswerSource) -> &'static str {
 
 /// What simulated walks do in a study; `None` if nothing.
 pub(crate) fn simulated_walks(walks: &SimulatedWalks) -> Option<String> {
-    let SimulatedWalks { effect, number, gait_rmse_tolerance_rad, least_mean_strides } = walks;
+    let SimulatedWalks { effect, number_of_simulated_walks: number, gait_rmse_tolerance_rad, least_mean_strides } =
+        walks;
     let what = match effect {
         SimulatedWalksEffect::None => return None,
         SimulatedWalksEffect::Report => "execution report for each gait".to_owned(),

@@ -6,7 +6,7 @@
 
 use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
 use super::problem_details::{PROBLEM_JSON, Problem};
-use super::{api, openapi_dependent_rules, openapi_nulls, openapi_rules};
+use super::{api, openapi_dependent_rules, openapi_nulls, openapi_rules, saved_as};
 use serde_json::{Map, Value, json};
 use utoipa::openapi::OpenApi;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityScheme};
@@ -25,8 +25,7 @@ use utoipa_axum::router::OpenApiRouter;
                        (RFC 3339).\n\nLists are paginated: \
                        `items` has the entries, and `next` is the `cursor` of the next page, which has the same \
                        filters and order. An unknown query parameter is refused (400), and so is a value that a \
-                       parameter does not accept (422).\n\nWith \
-                       `download=NAME.json` in the query of a GET request, a browser saves the response under this name.",
+                       parameter does not accept (422).",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
     servers((url = "/")),
@@ -150,6 +149,13 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
             "name": "limit", "in": "query", "required": false,
             "schema": { "type": "integer", "format": "int32", "minimum": 1, "maximum": LARGEST_LIMIT, "default": DEFAULT_LIMIT },
             "description": "Maximum number of entries on the page"
+        }));
+    }
+    if !changes && operation.pointer("/responses/200/content/application~1json").is_some() {
+        parameters.push(json!({
+            "name": saved_as::PARAMETER, "in": "query", "required": false,
+            "schema": { "type": "string", "pattern": saved_as::PATTERN, "maxLength": saved_as::LONGEST },
+            "description": "Name of the file, such as `trial.json`, as which a browser saves the response"
         }));
     }
     parameters.iter_mut().for_each(openapi_dependent_rules::state_parameter);

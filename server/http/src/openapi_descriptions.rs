@@ -4,9 +4,9 @@ use super::openapi_schemas::Schemas;
 use serde_json::json;
 
 /// Component, field with a slash between levels, and the description.
-type Described = (&'static str, &'static str, &'static str);
+type FieldDescription = (&'static str, &'static str, &'static str);
 
-const LEARNER: [Described; 21] = [
+const LEARNER: [FieldDescription; 21] = [
     (
         "LearnerSettings",
         "method",
@@ -81,7 +81,7 @@ const LEARNER: [Described; 21] = [
     ),
 ];
 
-const SOLVE_OPTIONS: [Described; 8] = [
+const SOLVE_OPTIONS: [FieldDescription; 8] = [
     ("SolveOptions", "tolerance", "Scaled optimality tolerance."),
     (
         "SolveOptions",
@@ -111,7 +111,7 @@ const SOLVE_OPTIONS: [Described; 8] = [
     ),
 ];
 
-const GAIT_SETTINGS: [Described; 51] = [
+const GAIT_SETTINGS: [FieldDescription; 51] = [
     ("GaitSettings", "mesh", "Number of mesh intervals of each kind of domain."),
     ("GaitSettings", "mesh/ds2", "Intervals of DS2, double support on the stance heel and the trailing toe."),
     ("GaitSettings", "mesh/ds3", "Intervals of DS3, double support on the flat stance foot and the trailing toe."),
@@ -211,7 +211,7 @@ const GAIT_SETTINGS: [Described; 51] = [
     ("GaitSettings", "muscles", "Muscle values of the subject that differ from the default values."),
 ];
 
-const OTHERS: [Described; 11] = [
+const OTHERS: [FieldDescription; 11] = [
     ("DeviceDefinition", "name", "Unique name."),
     (
         "DeviceDefinition",
@@ -234,7 +234,7 @@ const OTHERS: [Described; 11] = [
     ("MuscleParameters", "ta", "Tibialis anterior."),
 ];
 
-fn all() -> impl Iterator<Item = &'static Described> {
+fn all() -> impl Iterator<Item = &'static FieldDescription> {
     LEARNER.iter().chain(&SOLVE_OPTIONS).chain(&GAIT_SETTINGS).chain(&OTHERS)
 }
 

@@ -1,6 +1,5 @@
 //! Errors as pages.
 
-use crate::form_errors;
 use crate::problem_details::{Problem, Refusal};
 use crate::responded_to::RespondedTo;
 use askama::Template;
@@ -34,7 +33,6 @@ impl IntoResponse for PageError {
             return Redirect::to("/sign-in").into_response();
         }
         let error = match self.0 {
-            Error::Invalid(fault) => Error::Invalid(Box::new(form_errors::with_label(*fault))),
             // The names of rights are for programs.
             Error::MissingRight(_) => {
                 Error::Forbidden("Your account does not give access to this. Ask an administrator for it.".to_owned())

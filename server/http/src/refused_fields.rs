@@ -2,14 +2,26 @@
 //! an acceptable value in place of a refused one and reads the form again, until nothing is refused.
 
 use crate::form_errors;
+pub(crate) use crate::form_errors::FieldLabels;
 use axum::http::StatusCode;
 use gaitwright_service::error::{Error, FieldError};
 use std::ops::ControlFlow;
 
 /// The fields of a form as typed.
 pub(crate) trait TypedForm: Clone {
-    /// Name and label of each field, in the order of the form.
-    fn labels(&self) -> Vec<(String, String)>;
+    /// The labels that do not depend on data. The template of the form shows them with [`TypedForm::label`], so that a page
+    /// and its refusals have the same words.
+    const LABELS: FieldLabels;
+
+    /// The label of a field, for the template.
+    fn label(field: &str) -> &'static str {
+        label(Self::LABELS, field)
+    }
+
+    /// Every label, in the order of the form.
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(Self::LABELS)
+    }
 
     /// Puts an acceptable value in place of a refused one, to find the other fields that would be refused. Returns whether
     /// there is one.
@@ -26,8 +38,12 @@ pub(crate) trait TypedForm: Clone {
     }
 }
 
-/// Labels of fields that are written down once.
-pub(crate) fn labels_of(labels: &[(&str, &str)]) -> Vec<(String, String)> {
+/// The label of a field; empty for a field that the form does not have.
+pub(crate) fn label(labels: FieldLabels, field: &str) -> &'static str {
+    labels.iter().find(|(name, _)| *name == field).map_or("", |(_, label)| label)
+}
+
+pub(crate) fn labels_of(labels: FieldLabels) -> Vec<(String, String)> {
     labels.iter().map(|&(name, label)| (name.to_owned(), label.to_owned())).collect()
 }
 
@@ -40,22 +56,27 @@ pub(crate) struct RefusedFields {
 }
 
 impl RefusedFields {
-    /// The refusal of a form whose fields are checked once. Errors that are not about the form pass.
-    pub(crate) fn of(error: Error) -> Result<Self, Error> {
-        /// A form without labels of its own.
+    /// The refusal of a form with one field that can be refused. Errors that are not about the form pass.
+    pub(crate) fn of(error: Error, labels: FieldLabels) -> Result<Self, Error> {
         #[derive(Clone)]
-        struct Unlabelled;
-        impl TypedForm for Unlabelled {
+        struct CheckedOnce(FieldLabels);
+        impl TypedForm for CheckedOnce {
+            const LABELS: FieldLabels = &[];
             fn labels(&self) -> Vec<(String, String)> {
-                Vec::new()
+                labels_of(self.0)
             }
             fn repair(&mut self, _: &str) -> bool {
                 false
             }
         }
-        let mut check = FormCheck::new(&Unlabelled);
+        let mut check = FormCheck::new(&CheckedOnce(labels));
         check.refuse(error)?;
         Ok(check.into_refused())
+    }
+
+    /// A refusal that names no field, because that would help somebody who guesses a password.
+    pub(crate) fn without_field(reason: &str) -> Self {
+        Self { found: vec![FieldError::in_words("", reason)], only_conflicts: false }
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -91,6 +112,11 @@ impl RefusedFields {
             (false, false) => StatusCode::UNPROCESSABLE_ENTITY,
         }
     }
+}
+
+/// The refusal of a form with one field that can be refused, if it was refused.
+pub(crate) fn refused_once(done: Result<(), Error>, labels: FieldLabels) -> Result<RefusedFields, Error> {
+    done.map_or_else(|error| RefusedFields::of(error, labels), |()| Ok(RefusedFields::default()))
 }
 
 /// The check of a form.
@@ -143,7 +169,7 @@ impl<F: TypedForm> FormCheck<F> {
             return Ok(false);
         }
         let label = self.labels.iter().find(|(name, _)| *name == field).map(|(_, label)| label.as_str());
-        let message = form_errors::of_labelled(label, &fault);
+        let message = label.map_or_else(|| fault.message.clone(), |label| form_errors::of_field(label, &fault));
         let goes_on = self.repaired.repair(&field);
         self.refused.found.push(FieldError { field, message, ..fault });
         Ok(goes_on)

@@ -10,12 +10,19 @@ use axum::middleware::Next;
 use axum::response::Response;
 use gaitwright_service::error::Error;
 
-const PARAMETER: &str = "download";
+/// The parameter.
+pub(super) const PARAMETER: &str = "download";
+/// The names that it accepts, as a pattern.
+pub(super) const PATTERN: &str = r"^[\p{L}\p{N}][\p{L}\p{N}._-]*\.json$";
 /// Maximum length of a name, characters.
-const LONGEST: usize = 200;
+pub(super) const LONGEST: usize = 200;
 
-/// Takes the name out of the query, which handlers read strictly, and gives it to a JSON response. Other files name
-/// themselves.
+/// Marks a request whose response is saved under a name.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SavedByBrowser;
+
+/// Takes the name out of the query, which handlers read strictly, and gives it to the JSON response. Operations with other
+/// responses name their files themselves and refuse it (`described_parameters`).
 pub(super) async fn name(mut request: Request, next: Next) -> Result<Response, Refusal> {
     let reads = matches!(*request.method(), Method::GET | Method::HEAD);
     if !reads || !request.uri().path().starts_with("/api/v1/") {
@@ -23,6 +30,7 @@ pub(super) async fn name(mut request: Request, next: Next) -> Result<Response, R
     }
     let Some((name, rest)) = taken_from(request.uri())? else { return Ok(next.run(request).await) };
     *request.uri_mut() = rest;
+    request.extensions_mut().insert(SavedByBrowser);
     let mut response = next.run(request).await;
     let is_json = response.headers().get(header::CONTENT_TYPE).is_some_and(|kind| kind == "application/json");
     if response.status().is_success() && is_json && !response.headers().contains_key(header::CONTENT_DISPOSITION) {

@@ -3,6 +3,7 @@
 
 use crate::authentication::cookie_in;
 use crate::body_measures::{self, feet_and_inches, pounds};
+use crate::refused_fields::FieldLabels;
 use axum::extract::FromRequestParts;
 use axum::http::HeaderValue;
 use axum::http::request::Parts;
@@ -81,6 +82,25 @@ impl Units {
     /// The heading of such a column.
     pub(crate) fn mass_heading(self) -> &'static str {
         if self == Self::Si { "Body mass, kg" } else { "Body mass" }
+    }
+
+    /// The labels of a form with the fields `height_m` and `body_mass_kg`, whose labels have no unit.
+    pub(crate) fn with_headings(self, labels: FieldLabels) -> Vec<(String, String)> {
+        let heading = |&(name, label): &(&str, &str)| {
+            let label = match (name, label) {
+                ("height_m", "Height") => self.height_heading(),
+                ("height_m", _) => self.measured_height_heading(),
+                ("body_mass_kg", _) => self.mass_heading(),
+                _ => label,
+            };
+            (name.to_owned(), label.to_owned())
+        };
+        labels.iter().map(heading).collect()
+    }
+
+    /// The label of the height of a person whose gait was measured.
+    pub(crate) fn measured_height_heading(self) -> &'static str {
+        if self == Self::Si { "Height of the measured person, m" } else { "Height of the measured person" }
     }
 
     /// The text in an empty field for a height.

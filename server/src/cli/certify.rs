@@ -74,8 +74,11 @@ pub(super) fn for_people(certificate: &Certificate) -> String {
             map.speed_kept, map.speed_leak
         ));
         lines.push(format!(
-            "  largest deviation of the gait from the periodic motion: {:.1e} (rad or rad/s); {STRIDES} strides simulated",
-            map.fixed_point_distance
+            "  largest deviations of the gait from the periodic motion: {:.1e} m, {:.1e} rad, {:.1e} m/s, {:.1e} rad/s; {STRIDES} strides simulated",
+            map.fixed_point_distance.height_m,
+            map.fixed_point_distance.angle_rad,
+            map.fixed_point_distance.velocity_m_s,
+            map.fixed_point_distance.angular_velocity_rad_s
         ));
     }
     if let Some(map) = &certificate.free_hip_return_map {

@@ -17,8 +17,8 @@ pub(super) struct SimulateCommand {
     #[arg(value_name = "GAIT.json")]
     gait: PathBuf,
     /// Number of simulated walks with random disturbances on each kind of ground.
-    #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().simulated_walks, value_parser = walks, allow_negative_numbers = true)]
-    walks: u32,
+    #[arg(long, value_name = "NUMBER", default_value_t = ExecutionOptions::default().number_of_simulated_walks, value_parser = simulated_walks, allow_negative_numbers = true)]
+    simulated_walks: u32,
     /// Largest height of bumps and depth of dips in the ground, 0 (level) to 50 mm (default: 0, 5 and 10 in turn).
     #[arg(long, value_name = "MILLIMETRES", value_parser = ground, allow_negative_numbers = true)]
     ground: Option<f64>,
@@ -30,7 +30,7 @@ pub(super) struct SimulateCommand {
     json: bool,
 }
 
-fn walks(text: &str) -> Result<u32, String> {
+fn simulated_walks(text: &str) -> Result<u32, String> {
     whole(text, 1, ExecutionOptions::MOST_SIMULATED_WALKS)
 }
 
@@ -47,7 +47,7 @@ impl SimulateCommand {
     /// Simulates the walks. Falls are a result, not an error.
     pub(super) async fn run(self) -> Result<(), Error> {
         let mut options = ExecutionOptions {
-            simulated_walks: self.walks,
+            number_of_simulated_walks: self.simulated_walks,
             seed: self.seed,
             threads: std::thread::available_parallelism().map_or(1, usize::from),
             ..ExecutionOptions::default()
@@ -112,7 +112,7 @@ fn ground_for_people(ground: &SimulatedWalksOnGround) -> [String; 2] {
             "  {}: {} of {} simulated walks complete ({}, 95 % interval {} to {}); on average {:.1} strides; falls: {}, halts: {}",
             ground.ground_in_words(),
             ground.completed,
-            ground.simulated_walks,
+            ground.number_of_simulated_walks,
             percent(ground.completed_share),
             percent(low),
             percent(high),

@@ -161,8 +161,8 @@ async fn findings(store: &mut Store, ran: Run, certification: BestCertification)
 }
 
 fn walks_line(walks: &SimulatedWalksSummary) -> String {
-    let SimulatedWalksSummary { completed, simulated_walks, mean_strides, .. } = walks;
-    format!("{completed} of {simulated_walks} complete, {mean_strides:.2} strides on average")
+    let SimulatedWalksSummary { completed, number_of_simulated_walks, mean_strides, .. } = walks;
+    format!("{completed} of {number_of_simulated_walks} complete, {mean_strides:.2} strides on average")
 }
 
 /// The certificate of the best gait, and the alternative if it failed.

@@ -58,7 +58,7 @@ impl WorkerCommand {
         }
         let size = cores_or(self.workers);
         let solver = Arc::new(GaitSolver);
-        let worker = nats::Worker::connect(url, queue, name, size, LEASE, solver).await?;
+        let worker = nats::NatsWorker::connect(url, queue, name, size, LEASE, solver).await?;
         tracing::info!(workers = size, queue, "waiting for jobs");
         let stop = CancellationToken::new();
         let asked = tokio::spawn({

@@ -5,9 +5,9 @@ use gait_optimizer::Device as Definition;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// Device. Changing a definition creates a new device, so that studies keep the one they use.
+/// DeviceRow. Changing a definition creates a new device, so that studies keep the one they use.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Device {
+pub struct DeviceRow {
     /// Identifier.
     pub id: DeviceId,
     /// Name shown to users.
@@ -22,13 +22,13 @@ pub struct Device {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(Device, bool)> {
+pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(DeviceRow, bool)> {
     if let Some(found) = find(db, definition).await? {
         return Ok((found, false));
     }
     let text = json_columns::to_text("device", definition)?;
     let hash = json_columns::sha256(text.as_bytes());
-    let added = Device {
+    let added = DeviceRow {
         id: DeviceId::fresh(),
         name: definition.name.clone(),
         definition: definition.clone(),
@@ -49,7 +49,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
 ///
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
-pub async fn get(db: &mut Connection, id: DeviceId) -> StoreResult<Device> {
+pub async fn get(db: &mut Connection, id: DeviceId) -> StoreResult<DeviceRow> {
     let row = sqlx::query("select * from devices where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "device", id: id.to_string() })
 }
@@ -67,7 +67,7 @@ pub async fn has_name(db: &mut Connection, name: &str) -> StoreResult<bool> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<Option<Device>> {
+pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<Option<DeviceRow>> {
     let hash = json_columns::sha256(json_columns::to_text("device", definition)?.as_bytes());
     let row = sqlx::query("select * from devices where sha256 = ?").bind(hash).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
@@ -77,13 +77,13 @@ pub async fn find(db: &mut Connection, definition: &Definition) -> StoreResult<O
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn all(db: &mut Connection) -> StoreResult<Vec<Device>> {
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<DeviceRow>> {
     let rows = sqlx::query("select * from devices order by id desc").fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
-fn from_row(row: &SqliteRow) -> StoreResult<Device> {
-    Ok(Device {
+fn from_row(row: &SqliteRow) -> StoreResult<DeviceRow> {
+    Ok(DeviceRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
         definition: json_columns::column(row, "definition")?,

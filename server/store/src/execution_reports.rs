@@ -23,7 +23,7 @@ pub struct ExecutionReported {
     /// Its number.
     pub number: u32,
     /// Number of simulated walks on each kind of ground.
-    pub simulated_walks: u32,
+    pub number_of_simulated_walks: u32,
     /// Seed of the disturbances.
     pub seed: u64,
     /// Version of the program that made the report.
@@ -69,7 +69,7 @@ pub async fn newest(db: &mut Connection, trial: TrialId) -> StoreResult<Option<S
 /// Errors of the database.
 pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u64)>> {
     let rows = sqlx::query(
-        "select t.id, json_extract(a.detail, '$.simulated_walks') as simulated_walks, json_extract(a.detail, '$.seed') as seed \
+        "select t.id, json_extract(a.detail, '$.number_of_simulated_walks') as number_of_simulated_walks, json_extract(a.detail, '$.seed') as seed \
          from audit a join trials t on t.id = substr(a.object, 1 + length('trial ')) where a.change = ?1 \
          and not exists (select 1 from audit c where c.seq > a.seq and c.object = a.object and c.change in (?1, ?2)) \
          order by a.seq",
@@ -82,7 +82,7 @@ pub async fn requested(db: &mut Connection) -> StoreResult<Vec<(TrialId, u32, u6
         .map(|row| {
             // Seeds of requests are at most 2^53.
             let seed: i64 = row.try_get("seed")?;
-            Ok((row.try_get("id")?, row.try_get("simulated_walks")?, seed.cast_unsigned()))
+            Ok((row.try_get("id")?, row.try_get("number_of_simulated_walks")?, seed.cast_unsigned()))
         })
         .collect()
 }

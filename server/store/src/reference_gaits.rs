@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteRow;
 
 /// Reference gait. Changing a definition creates a new reference gait, so that studies keep the one they use.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ReferenceGait {
+pub struct ReferenceGaitRow {
     /// Identifier.
     pub id: ReferenceGaitId,
     /// Name shown to users.
@@ -22,7 +22,7 @@ pub struct ReferenceGait {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(ReferenceGait, bool)> {
+pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult<(ReferenceGaitRow, bool)> {
     let text = json_columns::to_text("reference gait", definition)?;
     let hash = json_columns::sha256(text.as_bytes());
     let found =
@@ -30,7 +30,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
     if let Some(row) = found {
         return Ok((from_row(&row)?, false));
     }
-    let added = ReferenceGait {
+    let added = ReferenceGaitRow {
         id: ReferenceGaitId::fresh(),
         name: definition.name.clone(),
         definition: definition.clone(),
@@ -51,7 +51,7 @@ pub async fn ensure(db: &mut Connection, definition: &Definition) -> StoreResult
 ///
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
-pub async fn get(db: &mut Connection, id: ReferenceGaitId) -> StoreResult<ReferenceGait> {
+pub async fn get(db: &mut Connection, id: ReferenceGaitId) -> StoreResult<ReferenceGaitRow> {
     let row = sqlx::query("select * from reference_gaits where id = ?").bind(id).fetch_optional(db).await?;
     row.as_ref()
         .map(from_row)
@@ -63,13 +63,13 @@ pub async fn get(db: &mut Connection, id: ReferenceGaitId) -> StoreResult<Refere
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn all(db: &mut Connection) -> StoreResult<Vec<ReferenceGait>> {
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<ReferenceGaitRow>> {
     let rows = sqlx::query("select * from reference_gaits order by id desc").fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
 
-fn from_row(row: &SqliteRow) -> StoreResult<ReferenceGait> {
-    Ok(ReferenceGait {
+fn from_row(row: &SqliteRow) -> StoreResult<ReferenceGaitRow> {
+    Ok(ReferenceGaitRow {
         id: row.try_get("id")?,
         name: row.try_get("name")?,
         definition: json_columns::column(row, "definition")?,

@@ -7,9 +7,9 @@ use gait_optimizer::muscle::MuscleParameters;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// Subject, known by a pseudonym only.
+/// SubjectRow, known by a pseudonym only.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Subject {
+pub struct SubjectRow {
     /// Identifier.
     pub id: SubjectId,
     /// Unique pseudonym assigned by the site.
@@ -24,7 +24,7 @@ pub struct Subject {
     pub created_at: Instant,
 }
 
-impl Subject {
+impl SubjectRow {
     /// Height and mass for the walking model.
     pub fn body(&self) -> Body {
         Body { height_m: self.height_m, body_mass_kg: self.body_mass_kg }
@@ -69,8 +69,8 @@ pub const PSEUDONYM_UNIQUE: &str = "subjects.pseudonym";
 ///
 /// # Errors
 /// A violated constraint ([`PSEUDONYM_UNIQUE`]); errors of the database.
-pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &str) -> StoreResult<Subject> {
-    let subject = Subject {
+pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &str) -> StoreResult<SubjectRow> {
+    let subject = SubjectRow {
         id: SubjectId::fresh(),
         pseudonym: pseudonym.to_owned(),
         height_m: body.height_m,
@@ -96,7 +96,7 @@ pub async fn insert(db: &mut Connection, pseudonym: &str, body: Body, notes: &st
 ///
 /// # Errors
 /// [`StoreError::Missing`]; errors of the database.
-pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
+pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<SubjectRow> {
     let row = sqlx::query(select!("where s.id = ?")).bind(id).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()?.ok_or_else(|| StoreError::Missing { what: "subject", id: id.to_string() })
 }
@@ -105,7 +105,7 @@ pub async fn get(db: &mut Connection, id: SubjectId) -> StoreResult<Subject> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<Option<Subject>> {
+pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<Option<SubjectRow>> {
     let row = sqlx::query(select!("where s.pseudonym = ?")).bind(pseudonym).fetch_optional(db).await?;
     row.as_ref().map(from_row).transpose()
 }
@@ -114,7 +114,7 @@ pub async fn by_pseudonym(db: &mut Connection, pseudonym: &str) -> StoreResult<O
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
+pub async fn all(db: &mut Connection) -> StoreResult<Vec<SubjectRow>> {
     let rows = sqlx::query(select!("order by s.id desc")).fetch_all(db).await?;
     rows.iter().map(from_row).collect()
 }
@@ -123,7 +123,7 @@ pub async fn all(db: &mut Connection) -> StoreResult<Vec<Subject>> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn consenting(db: &mut Connection) -> StoreResult<Vec<Subject>> {
+pub async fn consenting(db: &mut Connection) -> StoreResult<Vec<SubjectRow>> {
     let sql = select!("where s.id not in (select subject_id from withdrawn_subjects) order by s.id desc");
     sqlx::query(sql).fetch_all(db).await?.iter().map(from_row).collect()
 }
@@ -132,7 +132,7 @@ pub async fn consenting(db: &mut Connection) -> StoreResult<Vec<Subject>> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) -> StoreResult<Vec<Subject>> {
+pub async fn page(db: &mut Connection, before: Option<SubjectId>, limit: u32) -> StoreResult<Vec<SubjectRow>> {
     let rows = sqlx::query(select!("where ? is null or s.id < ? order by s.id desc limit ?"))
         .bind(before)
         .bind(before)
@@ -238,8 +238,8 @@ pub async fn set_muscles(
     Ok(())
 }
 
-fn from_row(row: &SqliteRow) -> StoreResult<Subject> {
-    Ok(Subject {
+fn from_row(row: &SqliteRow) -> StoreResult<SubjectRow> {
+    Ok(SubjectRow {
         id: row.try_get("id")?,
         pseudonym: row.try_get("pseudonym")?,
         height_m: row.try_get("height_m")?,

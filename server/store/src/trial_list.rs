@@ -34,12 +34,12 @@ pub struct Listing {
     /// Maximum number of trials.
     pub limit: u32,
     /// Where the page begins.
-    pub start: Start,
+    pub start: ListStart,
 }
 
 /// Where a page of a listing begins.
 #[derive(Debug, Clone)]
-pub enum Start {
+pub enum ListStart {
     /// With the first trial.
     First,
     /// After a trial that had this place, whatever became of it since.
@@ -100,9 +100,9 @@ pub struct ListedTrial {
 /// Errors of the database.
 pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) -> StoreResult<Vec<ListedTrial>> {
     let (is_before, place) = match &listing.start {
-        Start::First => (false, None),
-        Start::After(place) => (false, Some(place)),
-        Start::Before(place) => (true, Some(place)),
+        ListStart::First => (false, None),
+        ListStart::After(place) => (false, Some(place)),
+        ListStart::Before(place) => (true, Some(place)),
     };
     let query = sqlx::query(
         "with keyed as (select t.id, t.number, t.action, t.reason, t.warm_started_from, t.state, t.gait_rmse_rad, \

@@ -36,7 +36,7 @@ struct LogPosition {
 
 /// The header of a log.
 #[derive(Debug)]
-struct Header {
+struct WalHeader {
     salt: [u8; 8],
     page_bytes: usize,
     big_endian: bool,
@@ -76,7 +76,7 @@ impl Log {
         Ok(true)
     }
 
-    fn header(&mut self) -> io::Result<Option<Header>> {
+    fn header(&mut self) -> io::Result<Option<WalHeader>> {
         self.file.seek(SeekFrom::Start(0))?;
         let mut bytes = [0; HEADER_BYTES];
         if !read_whole(&mut self.file, &mut bytes)? {
@@ -92,11 +92,11 @@ impl Log {
         let big_endian = magic & 1 == 1;
         let sums = (sum_1, sum_2);
         let is_whole = summed((0, 0), &bytes[..HEADER_BYTES - 8], big_endian) == sums;
-        Ok(is_whole.then_some(Header { salt, page_bytes: page_bytes as usize, big_endian, sums }))
+        Ok(is_whole.then_some(WalHeader { salt, page_bytes: page_bytes as usize, big_endian, sums }))
     }
 }
 
-impl Header {
+impl WalHeader {
     /// The checksum including this frame; `None` if the frame does not belong to the log or is damaged.
     fn sums_after(&self, before: Sums, frame: &[u8]) -> Option<Sums> {
         let (head, page) = frame.split_at_checked(FRAME_HEADER_BYTES)?;

@@ -4,7 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_service::workers::nats::Worker;
+use gaitwright_service::workers::nats::NatsWorker;
 use gaitwright_tests::analytic::Analytic;
 use std::sync::Arc;
 use std::time::Duration;
@@ -17,6 +17,6 @@ async fn main() {
     let milliseconds = |text: &str| Duration::from_millis(text.parse().expect("milliseconds"));
     let solver = Analytic { hangs: u32::from(hangs == "true"), ..Analytic::slow(milliseconds(pause)) };
     let name = format!("worker {}", std::process::id());
-    let worker = Worker::connect(url, queue, name, 1, milliseconds(lease), Arc::new(solver)).await.unwrap();
+    let worker = NatsWorker::connect(url, queue, name, 1, milliseconds(lease), Arc::new(solver)).await.unwrap();
     Box::pin(worker.run(CancellationToken::new())).await.unwrap();
 }

@@ -3,11 +3,11 @@
 use super::kkt_solver::{Inertia, KktSolver, MatrixChange};
 use crate::status::NlpError;
 
-type Analysis = Box<dyn FnOnce() -> Result<Box<dyn KktSolver>, NlpError> + Send>;
+type DeferredAnalysis = Box<dyn FnOnce() -> Result<Box<dyn KktSolver>, NlpError> + Send>;
 
 /// A factorisation that is not analysed yet, ready, or whose analysis failed; then every matrix breaks down.
 pub(super) enum LazySolver {
-    Waiting(Analysis),
+    Waiting(DeferredAnalysis),
     Ready(Box<dyn KktSolver>),
     Failed,
 }

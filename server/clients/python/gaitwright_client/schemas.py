@@ -268,7 +268,7 @@ class _AnswerRetractionRequired(TypedDict):
 
 
 class AnswerRetraction(_AnswerRetractionRequired, total=False):
-    """Retraction of a preference or an assessment."""
+    """Retraction of a preference, an assessment or a suggestion."""
 
     # Author of the retraction. Defaults to the caller's name.
     author: Optional[str]
@@ -411,6 +411,8 @@ AuditDetail = TypedDict(
         "notes": "str",
         # Number of the trial, lab session, blind pair or answer.
         "number": "int",
+        # Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
+        "number_of_simulated_walks": "int",
         # `trial.relax`: number of trials of the study.
         "number_of_trials": "int",
         # `suggestion.give`: the trial whose gait the suggestion improves.
@@ -462,8 +464,6 @@ AuditDetail = TypedDict(
         "sha256": "str",
         # `study.import`: public key of the signature, hexadecimal. Null without a signature.
         "signed_by": "Optional[str]",
-        # Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
-        "simulated_walks": "int",
         # State, as in `StudyState`: `study.create`, `study.extend`.
         "state": "str",
         # `subject.withdraw`: studies that were stopped.
@@ -894,7 +894,7 @@ class Correction(TypedDict):
 
 
 class Preference(TypedDict):
-    """A preference or a suggestion of a study."""
+    """A preference of a study."""
 
     # Name or pseudonym of the person who answered.
     author: str
@@ -1207,6 +1207,19 @@ class ExecutionReport(TypedDict):
     strides_by_yield: list[StridesOnYield]
     # Completed strides without any disturbance.
     undisturbed_strides: int
+
+
+class FixedPointDistance(TypedDict):
+    """Largest differences between the gait's initial state and the fixed point of the closed loop."""
+
+    # In an angle, rad.
+    angle_rad: float
+    # In an angular velocity, rad/s.
+    angular_velocity_rad_s: float
+    # In the height of the hip, m.
+    height_m: float
+    # In a velocity of the hip, m/s.
+    velocity_m_s: float
 
 
 class FloquetMultiplier(TypedDict):
@@ -2058,10 +2071,10 @@ class NewEmg(_NewEmgRequired, total=False):
 class NewExecutionReport(TypedDict, total=False):
     """A request to simulate walks. There are three kinds of ground: level, and uneven by ±5 mm or ±10 mm."""
 
+    # Number of simulated walks on each kind of ground, 1 to 1000.
+    number_of_simulated_walks: int
     # Seed of the disturbances. The same seed gives the same report.
     seed: int
-    # Number of simulated walks on each kind of ground, 1 to 1000.
-    simulated_walks: int
 
 
 class _NewJointAnglesRequired(TypedDict):
@@ -2250,7 +2263,7 @@ class NewStudy(_NewStudyRequired, total=False):
     # Seed for all random draws except allocations.
     seed: int
     # Simulated walks with each gait. They do nothing by default.
-    simulated_walks: SimulatedWalks
+    simulated_walks: SimulatedWalksSetting
     # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
     # Total solve time, s, after which no new trial starts.
@@ -2277,6 +2290,26 @@ class NewSubject(_NewSubjectRequired, total=False):
 
     # Free text.
     notes: str
+
+
+class _NewSuggestionRequired(TypedDict):
+    # Suggested values of tuned bounds, such as `{"a5": 0.026}`. Each must be a value of the search space. Other bounds
+    # keep their values from the trial.
+    bounds: dict[str, float]
+    # Trial whose gait could be better.
+    over: TrialId
+
+
+class NewSuggestion(_NewSuggestionRequired, total=False):
+    """Bounds with which a gait would have been better than that of a trial."""
+
+    # Name or pseudonym of the author. Defaults to the caller's name.
+    author: Optional[str]
+    # Free text.
+    note: str
+    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    # `clinician` for any other user.
+    source: Optional[AnswerGiver]
 
 
 class _NewTokenRequired(TypedDict):
@@ -2337,17 +2370,6 @@ class Optimality(TypedDict):
     dual_infeasibility: float
 
 
-class PreferenceContentLabel(TypedDict):
-    """Label of a trial."""
-
-    # Kind of preference.
-    kind: Literal["label"]
-    # Whether the evaluation found a gait.
-    label: Label
-    # Identifier of the trial.
-    trial: TrialId
-
-
 class PreferenceContentPreference(TypedDict):
     """One trial is better than another."""
 
@@ -2368,17 +2390,6 @@ class PreferenceContentNoDifference(TypedDict):
     b: TrialId
     # Kind of preference.
     kind: Literal["no_difference"]
-
-
-class PreferenceContentSuggestion(TypedDict):
-    """An action would have been better than a trial."""
-
-    # Kind of preference.
-    kind: Literal["suggestion"]
-    # Trial to which the suggested action is preferred.
-    over: TrialId
-    # Index of the suggested action.
-    suggested: int
 
 
 class PrimalDualPoint(TypedDict):
@@ -2685,11 +2696,12 @@ class ReturnMap(TypedDict):
 
     # Resolution of the finite differences: the change of `largest_by_differences` by the last extrapolation.
     differences_resolve: float
-    # Largest component of the difference between the gait's initial state and the fixed point, rad and rad/s.
-    fixed_point_distance: float
-    # Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
+    # Distance between the gait's initial state and the fixed point.
+    fixed_point_distance: FixedPointDistance
+    # The same for a stride from the nearby fixed point of the closed loop.
     fixed_point_residual: float
-    # Largest change in a coordinate or velocity over one stride that starts at the gait's initial state, rad and rad/s.
+    # Largest change in a component of the state (m, rad, m/s or rad/s) over one stride that starts at the gait's
+    # initial state.
     gait_residual: float
     # Largest modulus of the multipliers.
     largest: float
@@ -2821,21 +2833,6 @@ class SignInLink(TypedDict):
     path: str
 
 
-class SimulatedWalks(TypedDict, total=False):
-    """Simulated walks with the gaits of a study. Their seed is that of the study, so that all gaits meet the same
-    disturbances.
-    """
-
-    # What they do.
-    effect: SimulatedWalksEffect
-    # `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
-    gait_rmse_tolerance_rad: float
-    # `label`: the least mean number of strides of an executable gait. A complete walk has 20 strides. 0 to 20.
-    least_mean_strides: float
-    # Number of simulated walks on each of the three kinds of ground, 1 to 1000.
-    number: int
-
-
 class SimulatedWalksOnGround(TypedDict):
     """Simulated walks on one kind of ground."""
 
@@ -2864,7 +2861,23 @@ class SimulatedWalksOnGround(TypedDict):
     # Mean number of completed strides.
     mean_strides: float
     # Number of simulated walks.
-    simulated_walks: int
+    number_of_simulated_walks: int
+
+
+class SimulatedWalksSetting(TypedDict, total=False):
+    """Simulated walks with the gaits of a study. Their seed is that of the study, so that all gaits meet the same
+    disturbances.
+    """
+
+    # What they do.
+    effect: SimulatedWalksEffect
+    # `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
+    gait_rmse_tolerance_rad: float
+    # `label`: the least mean number of strides of an executable gait. A complete simulated walk has 20 strides. 0 to
+    # 20.
+    least_mean_strides: float
+    # Number of simulated walks on each of the three kinds of ground, 1 to 1000.
+    number_of_simulated_walks: int
 
 
 class SolveOptionsLocalOptimumChoiceNearestToReference(TypedDict):
@@ -3072,7 +3085,7 @@ class StudyPlan(TypedDict):
     # Seed for all random draws except allocations.
     seed: int
     # Simulated walks with each gait.
-    simulated_walks: SimulatedWalks
+    simulated_walks: SimulatedWalksSetting
     # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
     # Total solve time, s, after which no new trial starts.
@@ -3221,24 +3234,29 @@ class Subject(TypedDict):
     pseudonym: str
 
 
-class _SuggestionRequired(TypedDict):
-    # Suggested values of tuned bounds, such as `{"a5": 0.026}`. Each must be a value of the search space. Other bounds
-    # keep their values from the trial.
-    bounds: dict[str, float]
-    # Trial whose gait could be better.
-    over: TrialId
-
-
-class Suggestion(_SuggestionRequired, total=False):
+class Suggestion(TypedDict):
     """Bounds with which a gait would have been better than that of a trial."""
 
-    # Name or pseudonym of the author. Defaults to the caller's name.
-    author: Optional[str]
+    # Name or pseudonym of the author.
+    author: str
+    # Suggested values of all tuned bounds.
+    bounds: dict[str, float]
+    # Time of recording.
+    created_at: Instant
+    # Identifier.
+    id: FeedbackId
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
-    # `clinician` for any other user.
-    source: Optional[AnswerGiver]
+    # Trial whose gait could be better.
+    over: TrialId
+    # Retraction. Null if it was not retracted.
+    retraction: Optional[Retraction]
+    # Sequence number.
+    seq: int
+    # Who or what it came from.
+    source: Source
+    # Identifier of the study.
+    study_id: StudyId
 
 
 class SurvivedPushes(TypedDict):
@@ -3579,6 +3597,4 @@ MarginEntry = Union[int, list[float]]
 
 
 # Content of a preference, in terms of trials.
-PreferenceContent = Union[
-    PreferenceContentLabel, PreferenceContentPreference, PreferenceContentNoDifference, PreferenceContentSuggestion,
-]
+PreferenceContent = Union[PreferenceContentPreference, PreferenceContentNoDifference]

@@ -10,6 +10,8 @@ from .types import Schema, alias, literal, optional, python_type, reference
 VERBS = ("get", "post", "put", "patch", "delete")
 # Parameters that the client sets itself.
 PAGING = ("cursor", "limit")
+# Parameters for browsers.
+BROWSER = ("download",)
 KEY = "Idempotency-Key"
 REVISION = "If-Match"
 RESUME = "Last-Event-ID"
@@ -31,7 +33,7 @@ class Operation:
         self.aliases: dict[str, str] = {}
         parameters = operation.get("parameters", [])
         self.by_place = {
-            place: {one["name"]: one for one in parameters if one["in"] == place}
+            place: {one["name"]: one for one in parameters if one["in"] == place and one["name"] not in BROWSER}
             for place in ("path", "query", "header")
         }
         unknown = set(self.by_place["header"]) - {KEY, REVISION, RESUME}

@@ -143,6 +143,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(preferences::retract))
         .routes(routes!(undo::preference))
         .routes(routes!(suggestions::of_study, suggestions::create))
+        .routes(routes!(suggestions::get))
+        .routes(routes!(suggestions::retract))
         .routes(routes!(assessments::of_study, assessments::create))
         .routes(routes!(assessments::get))
         .routes(routes!(assessments::retract))

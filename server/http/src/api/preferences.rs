@@ -41,7 +41,8 @@ pub(super) async fn of_study(
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let rows = feedback::comparisons(&mut reader, id, paging.after.unwrap_or(0), paging.to_read()).await?;
-    Ok(Json(paging.page(rows, |row| row.seq)?.map(Preference::from)))
+    let rows = rows.into_iter().map(Preference::try_from).collect::<Result<Vec<_>, _>>()?;
+    Ok(Json(paging.page(rows, |row| row.seq)?))
 }
 
 /// Download preferences as CSV
@@ -125,7 +126,7 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Visible(id, _): Visible<FeedbackId, Read>,
 ) -> Result<Json<Preference>, Refusal> {
-    Ok(Json(feedback::get(&mut *app.read().await?, id).await?.into()))
+    Ok(Json(feedback::get(&mut *app.read().await?, id).await?.try_into()?))
 }
 
 /// Recorded preference.
@@ -165,10 +166,10 @@ pub(super) async fn create(
     let other_answers =
         preference_answer::other_answers(&mut writer, &row).await?.into_iter().map(|other| other.id).collect();
     let location = format!("/api/v1/preferences/{given}");
-    request.created(&app, writer, location, &CreatedPreference { row: row.into(), other_answers }).await
+    request.created(&app, writer, location, &CreatedPreference { row: row.try_into()?, other_answers }).await
 }
 
-/// Retraction of a preference or an assessment.
+/// Retraction of a preference, an assessment or a suggestion.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnswerRetraction {
@@ -205,5 +206,5 @@ pub(super) async fn retract(
     };
     let row =
         preference_answer::retract(&mut writer, &request.caller, None, id, why.author.as_deref(), &why.reason).await?;
-    request.done(&app, writer, &Preference::from(row)).await
+    request.done(&app, writer, &Preference::try_from(row)?).await
 }

@@ -20,7 +20,7 @@ use gaitwright_service::access::{Read, Run};
 use gaitwright_service::job::JobId;
 use gaitwright_service::studies::cancelled_trial;
 use gaitwright_service::studies::command;
-use gaitwright_store::trial_list::{self, Listing, SORTS, Start, TrialPlace};
+use gaitwright_store::trial_list::{self, ListStart, Listing, SORTS, TrialPlace};
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
 use serde::de::{Deserialize, Deserializer, Error as _};
@@ -92,7 +92,7 @@ pub(super) async fn of_study(
         state,
         contains: String::new(),
         limit: paging.to_read(),
-        start: paging.after.clone().map_or(Start::First, Start::After),
+        start: paging.after.clone().map_or(ListStart::First, ListStart::After),
     };
     let listed = trial_list::of_study(&mut reader, id, &listing).await?;
     let (listed, next) = paging.page(listed, |trial| trial.place.clone())?.into_parts();

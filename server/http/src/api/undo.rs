@@ -89,7 +89,7 @@ async fn undo_answer(
     let mut restored = RestoredAnswer { preference: None, assessment: None };
     if let Some(id) = undo::undo(&mut writer, &request.caller, None, id, by.author.as_deref()).await? {
         match RecordedAnswer::get(&mut writer, None, id).await? {
-            RecordedAnswer::Preference(row) => restored.preference = Some(row.into()),
+            RecordedAnswer::Preference(row) => restored.preference = Some(row.try_into()?),
             RecordedAnswer::Assessment(row) => restored.assessment = Some(row.into()),
         }
     }

@@ -9,6 +9,7 @@ use crate::page_error::PageError;
 use axum::extract::State;
 use axum::response::Redirect;
 use gait_optimizer::certificate::{Certificate, Check, Difference, RECOVERY_STRIDES};
+use gait_optimizer::number_format::with_unit;
 use gaitwright_service::access::Run;
 use gaitwright_service::job::JobState;
 use gaitwright_service::studies::certificate_request;
@@ -49,8 +50,17 @@ impl InWords {
             values.push(("Share of a change in speed that remains after one stride", format::number(map.speed_kept)));
             values
                 .push(("Share of a change in speed that spreads to other coordinates", format::number(map.speed_leak)));
-            let distance = format::number(map.fixed_point_distance);
-            values.push(("Largest deviation of the gait from the periodic motion, rad or rad/s", distance));
+            let distance = map.fixed_point_distance;
+            values.push((
+                "Largest deviations of the gait from the periodic motion",
+                format!(
+                    "{} in the height of the hip, {} in an angle, {} in a velocity of the hip, {} in an angular velocity",
+                    with_unit(format::number(1e3 * distance.height_m), "mm"),
+                    with_angles_in_degrees(distance.angle_rad, "rad"),
+                    with_unit(format::number(distance.velocity_m_s), "m/s"),
+                    with_angles_in_degrees(distance.angular_velocity_rad_s, "rad/s"),
+                ),
+            ));
         }
         if let Some(free) = &certificate.free_hip_return_map {
             let words = format!("{:.3} (finite differences: {:.3})", free.largest, free.largest_by_differences);

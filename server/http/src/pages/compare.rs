@@ -1,6 +1,6 @@
 //! The page on which staff and subjects compare two gaits of a study.
 
-use super::compare_answer::{AnswerForm, AnswerOutcome, LABELS, give};
+use super::compare_answer::{self, AnswerForm, AnswerOutcome, LABELS, RETRACT_LABELS, RetractForm, give};
 use super::page_chart::{PageChart, shared_legend};
 use super::saved_answer::SavedAnswer;
 use super::study::{AnswerRow, answers};
@@ -78,19 +78,19 @@ struct ComparePage {
     typed: AnswerForm,
     /// The signed-in user; empty without sign-in.
     user: String,
-    refused: Option<Refusal>,
+    refused: Option<RefusedPair>,
     /// The answers so far, if every pair has one.
     answers: Vec<AnswerRow>,
 }
 
 /// Why a form was refused.
-struct Refusal {
+struct RefusedPair {
     why: String,
     /// Whether the same answer would be refused again, so that the page does not offer it.
     is_final: bool,
 }
 
-impl Refusal {
+impl RefusedPair {
     fn correctable(why: String) -> Self {
         Self { why, is_final: false }
     }
@@ -172,8 +172,9 @@ pub(super) async fn get(
         (typed.author, typed.source) = (user.clone(), Source::Clinician.as_str().to_owned());
     }
     if choice.a.is_some() && choice.a == choice.b {
-        let refused =
-            Refusal::correctable("The first and the second gait are the same. Choose two different gaits.".to_owned());
+        let refused = RefusedPair::correctable(
+            "The first and the second gait are the same. Choose two different gaits.".to_owned(),
+        );
         return Box::pin(show(&mut app, id, GaitsQuery { a: None, b: None, ..choice }, (user, typed), Some(refused)))
             .await;
     }
@@ -190,7 +191,7 @@ async fn show(
     id: StudyId,
     choice: GaitsQuery,
     (user, typed): (String, AnswerForm),
-    refused: Option<Refusal>,
+    refused: Option<RefusedPair>,
 ) -> PageResult {
     let mut reader = app.read().await?;
     let last_event = events::last(&mut reader, id).await?;
@@ -324,15 +325,35 @@ pub(super) async fn post(
             (Some(saved), StatusCode::CONFLICT, why.to_owned())
         }
         Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            (None, Problem::from(&error).status(), form_errors::of_form(&error, &LABELS))
+            (None, Problem::from(&error).status(), form_errors::of_form(&error, LABELS))
         }
         Err(other) => return Err(other.into()),
     };
     let change = form.changed().ok().flatten();
     let choice = GaitsQuery { a: form.a.parse().ok(), b: form.b.parse().ok(), saved, change };
     let typed = (user_of(&authorized.caller), form);
-    let refused = Refusal { why, is_final: status == StatusCode::CONFLICT };
+    let refused = RefusedPair { why, is_final: status == StatusCode::CONFLICT };
     Ok((status, Box::pin(show(&mut app, id, choice, typed, Some(refused))).await?).into_response())
+}
+
+/// `POST /studies/{id}/retract`.
+pub(super) async fn retract(
+    authorized: Authorized<access::Answer>,
+    State(mut app): State<AppState>,
+    Id(id, _): Id<StudyId, access::Answer>,
+    Form(form): Form<RetractForm>,
+) -> Result<Response, PageError> {
+    match compare_answer::retract(&app, &authorized.caller, id, &form).await {
+        Ok(()) => Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)).into_response()),
+        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
+            let choice = GaitsQuery { saved: Some(form.saved), ..GaitsQuery::default() };
+            let typed = (user_of(&authorized.caller), AnswerForm::default());
+            let refused = RefusedPair::correctable(form_errors::of_form(&error, RETRACT_LABELS));
+            let shown = Box::pin(show(&mut app, id, choice, typed, Some(refused))).await?;
+            Ok((Problem::from(&error).status(), shown).into_response())
+        }
+        Err(other) => Err(other.into()),
+    }
 }
 
 /// The form to undo an answer.
@@ -366,7 +387,7 @@ pub(super) async fn undo(
             drop(writer);
             let choice = GaitsQuery { saved: Some(saved), ..GaitsQuery::default() };
             let typed = (user_of(caller), AnswerForm::default());
-            let refused = Refusal::correctable(error.to_string());
+            let refused = RefusedPair::correctable(error.to_string());
             let shown = Box::pin(show(&mut app, id, choice, typed, Some(refused))).await?;
             Ok((Problem::from(&error).status(), shown).into_response())
         }

@@ -1,13 +1,8 @@
 //! The forms with which staff and subjects answer about two gaits of a study, and retract the answer.
 
 use crate::AppState;
-use crate::accessible::Id;
-use crate::authorization::Authorized;
-use crate::extractors::Form;
-use crate::page_error::PageError;
-use axum::extract::State;
-use axum::response::Redirect;
-use gaitwright_service::access::{self, Caller};
+use crate::refused_fields::FieldLabels;
+use gaitwright_service::access::Caller;
 use gaitwright_service::error::Error;
 use gaitwright_service::printable;
 use gaitwright_service::studies::answer_giver::AnswerGiver;
@@ -122,7 +117,7 @@ pub(super) enum AnswerOutcome {
 }
 
 /// The labels of the form.
-pub(super) const LABELS: [(&str, &str); 6] = [
+pub(super) const LABELS: FieldLabels = &[
     ("a", "First gait"),
     ("b", "Second gait"),
     ("answer", "Answer"),
@@ -195,20 +190,18 @@ async fn changes_own(db: &mut Connection, study: StudyId, form: &AnswerForm) -> 
 /// The form to retract an answer.
 #[derive(Debug, Deserialize)]
 pub(super) struct RetractForm {
-    saved: AnswerId,
+    pub(super) saved: AnswerId,
     author: String,
     reason: String,
 }
 
-/// `POST /studies/{id}/retract`.
-pub(super) async fn retract(
-    authorized: Authorized<access::Answer>,
-    State(app): State<AppState>,
-    Id(id, _): Id<StudyId, access::Answer>,
-    Form(form): Form<RetractForm>,
-) -> Result<Redirect, PageError> {
+/// The labels of the form to retract an answer.
+pub(super) const RETRACT_LABELS: FieldLabels = &[("author", "Your name or code"), ("reason", "Reason")];
+
+/// Retracts the answer that the form names.
+pub(super) async fn retract(app: &AppState, caller: &Caller, id: StudyId, form: &RetractForm) -> Result<(), Error> {
     let mut writer = app.write().await?;
-    let (caller, author, reason) = (&authorized.caller, Some(form.author.as_str()), form.reason.as_str());
+    let (author, reason) = (Some(form.author.as_str()), form.reason.as_str());
     match RecordedAnswer::get(&mut writer, Some(id), form.saved).await? {
         RecordedAnswer::Preference(row) => {
             preference_answer::retract(&mut writer, caller, Some(id), row.id, author, reason).await?;
@@ -219,5 +212,5 @@ pub(super) async fn retract(
     }
     commit(writer).await?;
     app.scheduler.changed();
-    Ok(Redirect::to(&format!("/studies/{id}/compare?saved={}", form.saved)))
+    Ok(())
 }

@@ -7,7 +7,7 @@ use crate::extractors::{Form, FormFields};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm, labels_of};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -15,7 +15,7 @@ use gait_optimizer::{Device as Definition, DeviceField};
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::device;
-use gaitwright_store::devices::{self, Device};
+use gaitwright_store::devices::{self, DeviceRow};
 use gaitwright_store::{DeviceId, commit};
 use serde_json::{Map, Value, json};
 use std::ops::ControlFlow;
@@ -23,15 +23,15 @@ use std::ops::ControlFlow;
 #[derive(Template)]
 #[template(path = "device.html")]
 struct DevicePage {
-    device: Device,
-    rows: Vec<DeviceRow>,
+    device: DeviceRow,
+    rows: Vec<FieldRow>,
     name: String,
     carried_limb: bool,
     may_run: bool,
     refused: RefusedFields,
 }
 
-struct DeviceRow {
+struct FieldRow {
     field: DeviceField,
     allowed: String,
     value: String,
@@ -39,8 +39,8 @@ struct DeviceRow {
 }
 
 impl DevicePage {
-    fn of(device: Device, may_run: bool) -> Self {
-        let of_device = |field: &DeviceField| DeviceRow {
+    fn of(device: DeviceRow, may_run: bool) -> Self {
+        let of_device = |field: &DeviceField| FieldRow {
             field: *field,
             allowed: format::range(field.minimum, field.maximum),
             value: (field.value)(&device.definition).to_string(),
@@ -75,9 +75,11 @@ struct DerivedDevice {
 }
 
 impl TypedForm for DerivedDevice {
+    const LABELS: FieldLabels = &[("name", "Name")];
+
     fn labels(&self) -> Vec<(String, String)> {
         let quantities = Definition::FIELDS.iter().map(|field| (field.name.to_owned(), field.meaning.to_owned()));
-        [("name".to_owned(), "Name".to_owned())].into_iter().chain(quantities).collect()
+        labels_of(Self::LABELS).into_iter().chain(quantities).collect()
     }
 
     fn repair(&mut self, field: &str) -> bool {

@@ -6,12 +6,12 @@ use crate::page_error::{PageResult, page};
 use askama::Template;
 use axum::extract::State;
 use gaitwright_service::access::Read;
-use gaitwright_store::devices::{self, Device};
+use gaitwright_store::devices::{self, DeviceRow};
 
 #[derive(Template)]
 #[template(path = "devices.html")]
 struct DevicesPage {
-    devices: Vec<Device>,
+    devices: Vec<DeviceRow>,
 }
 
 /// `GET /devices`.

@@ -7,21 +7,24 @@ use super::joint_peaks::JointPeaks;
 use super::local_optima::{self as shown_local_optima, ShownLocalOptimum};
 use super::page_chart::{PageChart, shared_legend};
 use super::reached_bounds::{self, BoundUse};
+use super::safety_review::{ReportFields, ReviewFields};
 use super::sensitivities::SensitivityTable;
-use super::simulated_walks::SimulatedWalks;
+use super::simulated_walks::{SimulatedWalksSection, SimulationFields};
 use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::format::{self, words};
-use crate::page_error::{PageResult, page};
+use crate::page_error::{PageError, PageResult, page};
+use crate::refused_fields::{RefusedFields, TypedForm};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
+use axum::response::{IntoResponse, Response};
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, IterationRecord, ReferenceGait};
 use gaitwright_charts::{Figure, GaitWalker, Ghost, gait_charts};
 use gaitwright_compute::OnPool;
-use gaitwright_service::access::{Answer, Read, RequiredRight, Run};
+use gaitwright_service::access::{Answer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{self, Simulation};
 use gaitwright_service::studies::explanation::{self, ExplanationState};
@@ -58,7 +61,7 @@ struct GaitPage {
     /// The job that makes the certificate.
     certification: CertificateJob,
     /// Simulated walks, for a converged gait.
-    walks: Option<SimulatedWalks>,
+    walks: Option<SimulatedWalksSection>,
     /// Whether the page offers the sensitivities of a converged gait, which take a second.
     offers_sensitivities: bool,
     /// The sensitivities, or why there are none.
@@ -89,12 +92,39 @@ struct GaitPage {
     /// The name of a user who may review the reports.
     reviewer: Option<String>,
     trial: Trial,
+    forms: GaitForms,
+    refused: RefusedFields,
+}
+
+/// The forms of the page as typed, to show a refused one again.
+#[derive(Default)]
+pub(super) struct GaitForms {
+    /// The refused form: `simulation`, `report` or `review`.
+    pub(super) open: &'static str,
+    pub(super) refused: RefusedFields,
+    pub(super) simulation: Option<SimulationFields>,
+    pub(super) report: ReportFields,
+    pub(super) review: ReviewFields,
 }
 
 impl GaitPage {
     /// Whether the page shows a result that a job is computing.
     fn follows_a_job(&self) -> bool {
-        self.certification.is_pending() || self.walks.as_ref().is_some_and(SimulatedWalks::is_pending)
+        self.certification.is_pending() || self.walks.as_ref().is_some_and(SimulatedWalksSection::is_pending)
+    }
+
+    fn is_refused(&self, form: &str) -> bool {
+        self.forms.open == form
+    }
+
+    /// The attributes of a field of this form. Two forms have a field `author`.
+    fn invalid(&self, form: &str, field: &str) -> &'static str {
+        if self.is_refused(form) { self.refused.invalid(field) } else { "" }
+    }
+
+    /// The name in the form of a review: as typed, or that of the user.
+    fn review_author<'a>(&'a self, reviewer: &'a str) -> &'a str {
+        if self.is_refused("review") { &self.forms.review.author } else { reviewer }
     }
 
     /// The safety reports in force of the page, for a review; `None` without one.
@@ -105,7 +135,7 @@ impl GaitPage {
 }
 
 /// The optional parts of the page.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GaitQuery {
     #[serde(default)]
@@ -119,6 +149,21 @@ pub(super) async fn get(
     Visible(id, _): Visible<TrialId, Read>,
     Params(shown): Params<GaitQuery>,
 ) -> PageResult {
+    show(&mut app, authorized.caller, id, shown, GaitForms::default()).await
+}
+
+/// Shows the page again with a refused form.
+pub(super) async fn refuse(
+    app: &mut AppState,
+    caller: Caller,
+    id: TrialId,
+    forms: GaitForms,
+) -> Result<Response, PageError> {
+    let status = forms.refused.status();
+    Ok((status, show(app, caller, id, GaitQuery::default(), forms).await?).into_response())
+}
+
+async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery, mut forms: GaitForms) -> PageResult {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -142,7 +187,8 @@ pub(super) async fn get(
     let certificate = certificates::find(&mut reader, id).await?.map(certificate::InWords::new);
     let with_gait = trial.state.has_gait();
     let walks = if with_gait {
-        Some(SimulatedWalks::new(app.scheduler.simulating(id), execution::newest(&mut reader, id).await?))
+        let report = execution::newest(&mut reader, id).await?;
+        Some(SimulatedWalksSection::new(app.scheduler.simulating(id), report, forms.simulation.take()))
     } else {
         None
     };
@@ -156,10 +202,10 @@ pub(super) async fn get(
         _ => Vec::new(),
     };
     let local_optima = local_optima::of_trial(&mut reader, id).await?;
-    let may_run = authorized.caller.may(Run::NEEDED);
-    let reviews = authorized.caller.may(Answer::NEEDED);
+    let may_run = caller.may(Run::NEEDED);
+    let reviews = caller.may(Answer::NEEDED);
     // Without sign-in the name is unknown.
-    let reviewer = reviews.then(|| authorized.caller.user.map_or_else(String::new, |_| authorized.caller.name));
+    let reviewer = reviews.then(|| caller.user.map_or_else(String::new, |_| caller.name));
     drop(reader);
     let root_study = is_root(&study, &trial).then_some(study.id);
     let has_gait = gait.is_some();
@@ -212,6 +258,8 @@ pub(super) async fn get(
         reviewer,
         trial,
         study,
+        refused: std::mem::take(&mut forms.refused),
+        forms,
     })
 }
 

@@ -1,6 +1,6 @@
 //! The page of a lab session with its walks and measurements.
 
-use super::measurement_forms::{FilterFields, Forms};
+use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::Id;
@@ -10,7 +10,7 @@ use crate::figures::lab_charts;
 use crate::figures::lab_session::measured_cycles;
 use crate::format::{self, words};
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::RefusedFields;
+use crate::refused_fields::{FieldLabels, RefusedFields, TypedForm, refused_once};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -247,6 +247,11 @@ pub(super) struct Note {
     note: String,
 }
 
+/// The label of the note with which a session is closed.
+const CLOSING: FieldLabels = &[("note", "Note")];
+/// The label of the reason for unblinding.
+const UNBLINDING: FieldLabels = &[("note", "Reason")];
+
 /// `POST /lab-sessions/{id}/close`.
 pub(super) async fn close(
     authorized: Authorized<Run>,
@@ -259,7 +264,7 @@ pub(super) async fn close(
         lab::close(&mut writer, &authorized.caller.actor, id, &note).await?;
         Ok(commit(writer).await?)
     };
-    let refused = done.await.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))?;
+    let refused = refused_once(done.await, CLOSING)?;
     answer(&mut app, id, &authorized.caller, refused, Forms::default()).await
 }
 
@@ -275,7 +280,7 @@ pub(super) async fn unblind(
         lab::unblind(&mut writer, &authorized.caller.actor, id, &note).await?;
         Ok(commit(writer).await?)
     };
-    let refused = done.await.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))?;
+    let refused = refused_once(done.await, UNBLINDING)?;
     // The learner may have a new preference.
     app.scheduler.changed();
     answer(&mut app, id, &authorized.caller, refused, Forms::default()).await

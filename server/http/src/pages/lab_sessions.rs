@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::extractors::Form;
 use crate::format::{self, words};
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -70,9 +70,7 @@ impl LabSessionFields {
 }
 
 impl TypedForm for LabSessionFields {
-    fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[("trial_a", "Gait A"), ("trial_b", "Gait B"), ("notes", "Notes")])
-    }
+    const LABELS: FieldLabels = &[("trial_a", "Gait A"), ("trial_b", "Gait B"), ("notes", "Notes")];
 
     /// Only the list has acceptable gaits.
     fn repair(&mut self, _: &str) -> bool {

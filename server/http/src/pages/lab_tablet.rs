@@ -4,10 +4,9 @@ use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::Form;
-use crate::form_errors;
 use crate::format::walks_in_words;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::{FieldLabels, RefusedFields, refused_once};
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -40,7 +39,7 @@ struct WalkPage {
     /// The answer in force.
     answer_in_words: &'static str,
     seen: LabSessionProgress,
-    refused: Option<String>,
+    refused: RefusedFields,
     /// The note of a refused form.
     typed: String,
 }
@@ -51,6 +50,11 @@ impl WalkPage {
         self.seen.walk.is_none_or(|walk| walk == 3)
     }
 }
+
+/// The fields of the form of a walk.
+const WALK: FieldLabels = &[("note", "Note")];
+/// The fields of the form of an answer.
+const ANSWER: FieldLabels = &[("note", "What the subject noticed")];
 
 /// The form of a walk.
 #[derive(Debug, Deserialize)]
@@ -90,10 +94,10 @@ pub(super) async fn get(
     State(app): State<AppState>,
     Id(id, _): Id<LabSessionId, Rate>,
 ) -> PageResult {
-    show(&app, id, None, String::new()).await
+    show(&app, id, RefusedFields::default(), String::new()).await
 }
 
-async fn show(app: &AppState, id: LabSessionId, refused: Option<String>, typed: String) -> PageResult {
+async fn show(app: &AppState, id: LabSessionId, refused: RefusedFields, typed: String) -> PageResult {
     let seen = lab::session_progress(&mut *app.read().await?, id).await?;
     let answer_in_words = seen.answer.as_ref().map_or("", |answer| walks_in_words(answer.answer));
     page(&WalkPage { name: lab::name_in_lab(id), answer_in_words, seen, refused, typed })
@@ -121,7 +125,7 @@ pub(super) async fn record(
         }
         Ok(())
     };
-    read_back(&app, id, recorded.await, walked.note).await
+    read_back(&app, id, (recorded.await, WALK), walked.note).await
 }
 
 /// `POST /lab/{id}/answer`.
@@ -138,7 +142,7 @@ pub(super) async fn answer(
         app.scheduler.changed();
         Ok(())
     };
-    read_back(&app, id, answered.await, new.note).await
+    read_back(&app, id, (answered.await, ANSWER), new.note).await
 }
 
 /// `POST /lab/{id}/retract`.
@@ -152,22 +156,19 @@ pub(super) async fn retract(
         lab::retract(&mut writer, &authorized.caller, id).await?;
         Ok(commit(writer).await?)
     };
-    read_back(&app, id, retracted.await, String::new()).await
+    read_back(&app, id, (retracted.await, &[]), String::new()).await
 }
 
 /// Shows the present state, with the reason and the typed note if a form was refused.
 async fn read_back(
     app: &AppState,
     id: LabSessionId,
-    done: Result<(), Error>,
+    (done, labels): (Result<(), Error>, FieldLabels),
     typed: String,
 ) -> Result<Response, PageError> {
-    match done {
-        Ok(()) => Ok(Redirect::to(&format!("/lab/{id}")).into_response()),
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_))) => {
-            let shown = show(app, id, Some(form_errors::in_words(&error)), typed).await?;
-            Ok((Problem::from(&error).status(), shown).into_response())
-        }
-        Err(other) => Err(other.into()),
+    let refused = refused_once(done, labels)?;
+    if refused.is_empty() {
+        return Ok(Redirect::to(&format!("/lab/{id}")).into_response());
     }
+    Ok((refused.status(), show(app, id, refused, typed).await?).into_response())
 }

@@ -99,7 +99,7 @@ async fn previewed_emg(app: &mut AppState, new: NewEmg, check: &FormCheck<EmgFie
         preview.refused.retain(|error| {
             !matches!(error, Error::Invalid(fault) if refused.iter().any(|field| fault.field.ends_with(field.as_str())))
         });
-        let recording = RecordingPreview::of_emg(&preview);
+        let recording = RecordingPreview::of_emg(&preview, EmgFields::LABELS);
         Ok::<_, Error>(PreviewedEmg { columns: preview.columns, channels: lab_charts::muscles(), recording })
     };
     app.compute(draw).await?
@@ -107,7 +107,8 @@ async fn previewed_emg(app: &mut AppState, new: NewEmg, check: &FormCheck<EmgFie
 
 /// Reads and draws the file of the form on the thread pool. Nothing is stored.
 async fn previewed_joint_angles(app: &mut AppState, new: NewJointAngles) -> Result<RecordingPreview, Error> {
-    app.compute(move |_: &OnPool| Ok(RecordingPreview::of_joint_angles(&new.preview()?))).await?
+    app.compute(move |_: &OnPool| Ok(RecordingPreview::of_joint_angles(&new.preview()?, JointAngleFields::LABELS)))
+        .await?
 }
 
 /// Stores a file, if no field was refused.

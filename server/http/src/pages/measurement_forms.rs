@@ -1,8 +1,8 @@
 //! The forms of a lab session for measurement files and filter settings, as typed, and their parsed values.
 
 use super::recording_preview::RecordingPreview;
-use crate::refused_fields::{RefusedFields, TypedForm, labels_of};
-use gait_optimizer::emg::{CHANNELS, EmgSettings};
+use crate::refused_fields::{FieldLabels, RefusedFields, TypedForm};
+use gait_optimizer::emg::{CHANNELS, EmgSettings, HIGHEST_RATE_HZ};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{EmgReading, JointAngleReading, MeasurementFormat, NewEmg, NewJointAngles};
 use gaitwright_service::studies::reference_import::Unit;
@@ -90,19 +90,17 @@ impl EmgFields {
 }
 
 impl TypedForm for EmgFields {
-    fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[
-            ("walk", "Walk"),
-            ("rate_hz", "Sampling rate, Hz"),
-            ("recording", "File contents"),
-            ("channels", "Channel columns"),
-            ("heel_strikes_s", "Right heel strikes, s"),
-            ("heel_strike_column", "Heel strike column"),
-            ("heel_strike_threshold", "Contact threshold"),
-            ("rejected_strides", "Rejected strides"),
-            ("file_name", "File name"),
-        ])
-    }
+    const LABELS: FieldLabels = &[
+        ("walk", "Walk"),
+        ("rate_hz", "Sampling rate, Hz"),
+        ("recording", "File contents"),
+        ("channels", "Channel columns"),
+        ("heel_strikes_s", "Right heel strikes, s"),
+        ("heel_strike_column", "Heel strike column"),
+        ("heel_strike_threshold", "Contact threshold"),
+        ("rejected_strides", "Rejected strides"),
+        ("file_name", "File name"),
+    ];
 
     fn repair(&mut self, field: &str) -> bool {
         match field {
@@ -238,15 +236,13 @@ impl JointAngleFields {
 }
 
 impl TypedForm for JointAngleFields {
-    fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[
-            ("walk", "Walk"),
-            ("unit", "Angle unit of an OpenSim file"),
-            ("cutoff_hz", "Low-pass cut-off, Hz"),
-            ("file_name", "File name"),
-            ("recording", "File contents"),
-        ])
-    }
+    const LABELS: FieldLabels = &[
+        ("walk", "Walk"),
+        ("unit", "Angle unit of an OpenSim file"),
+        ("cutoff_hz", "Low-pass cut-off, Hz"),
+        ("file_name", "File name"),
+        ("recording", "File contents"),
+    ];
 
     fn repair(&mut self, field: &str) -> bool {
         match field {
@@ -279,9 +275,6 @@ impl FilterFields {
     }
 }
 
-/// The highest sampling rate of a recording, at which the settings have their widest ranges, Hz.
-const HIGHEST_RATE_HZ: f64 = 20_000.0;
-
 impl FilterFields {
     /// The settings, as far as they can be checked without a recording.
     pub(super) fn read_and_check(&self) -> Result<EmgSettings, Error> {
@@ -292,14 +285,12 @@ impl FilterFields {
 }
 
 impl TypedForm for FilterFields {
-    fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[
-            ("band_low_hz", "Band-pass from, Hz"),
-            ("band_high_hz", "Band-pass to, Hz"),
-            ("envelope_hz", "Low-pass cut-off, Hz"),
-            ("order", "Filter order"),
-        ])
-    }
+    const LABELS: FieldLabels = &[
+        ("band_low_hz", "Band-pass from, Hz"),
+        ("band_high_hz", "Band-pass to, Hz"),
+        ("envelope_hz", "Low-pass cut-off, Hz"),
+        ("order", "Filter order"),
+    ];
 
     /// The widest band, so that the other edge is not refused because of it.
     fn repair(&mut self, field: &str) -> bool {

@@ -6,11 +6,10 @@ use crate::accessible::{DespiteWithdrawal, Id, Named};
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extractors::Form;
-use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
 use crate::qr_code;
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use askama::Template;
 use axum::extract::State;
 use axum::http::HeaderMap;
@@ -24,6 +23,7 @@ use gaitwright_store::members::{Member, MemberKind};
 use gaitwright_store::studies::Study;
 use gaitwright_store::{MemberId, StudyId, Writer, commit, consents, studies};
 use serde::Deserialize;
+use std::ops::ControlFlow;
 
 #[derive(Template)]
 #[template(path = "study_members.html")]
@@ -40,9 +40,9 @@ struct MembersPage {
     withdrawn: bool,
     /// A new sign-in link, shown only once: user and link.
     link: Option<(String, String)>,
-    refused: Option<String>,
-    /// The name in a refused invitation.
-    typed: String,
+    refused: RefusedFields,
+    /// The entries of a refused form.
+    typed: MembersForm,
 }
 
 impl MembersPage {
@@ -79,8 +79,8 @@ pub(super) async fn get(
 #[derive(Default)]
 struct AfterAction {
     link: Option<(String, String)>,
-    refused: Option<String>,
-    typed: String,
+    refused: RefusedFields,
+    typed: MembersForm,
 }
 
 async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) -> PageResult {
@@ -111,7 +111,7 @@ async fn show(app: &AppState, caller: &Caller, id: StudyId, shown: AfterAction) 
 }
 
 /// The fields of every form of the page.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 pub(super) struct MembersForm {
     button: String,
     /// `user R1` or `token rig`.
@@ -131,6 +131,22 @@ pub(super) struct MembersForm {
     reason: String,
 }
 
+impl TypedForm for MembersForm {
+    const LABELS: FieldLabels =
+        &[("who", "User or token"), ("name", "Name or code of the rater"), ("rater", "Rater"), ("reason", "Reason")];
+
+    /// Only the lists have acceptable members and raters.
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            // A name that nobody has.
+            "name" => self.name = MemberId::fresh().to_string(),
+            "reason" => "a reason".clone_into(&mut self.reason),
+            _ => return false,
+        }
+        true
+    }
+}
+
 /// `POST /studies/{id}/members`. Answers with the page instead of a redirect, because a link is not stored and can be shown
 /// only here.
 pub(super) async fn post(
@@ -141,27 +157,30 @@ pub(super) async fn post(
     headers: HeaderMap,
     Form(form): Form<MembersForm>,
 ) -> Result<Response, PageError> {
-    let mut writer = app.write().await?;
-    match apply(&mut writer, &authorized.caller, id, &form).await {
-        Ok(invited) => {
-            commit(writer).await?;
-            app.scheduler.changed();
-            let Some((name, secret)) = invited else {
-                // Users who removed themselves can no longer see the study.
-                return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
-            };
-            let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
-            Ok(show(&app, &authorized.caller, id, AfterAction { link, ..AfterAction::default() })
-                .await?
-                .into_response())
+    let mut check = FormCheck::new(&form);
+    loop {
+        let mut writer = app.write().await?;
+        let applied = apply(&mut writer, &authorized.caller, id, check.form()).await;
+        match check.step(applied)? {
+            ControlFlow::Continue(()) => {}
+            ControlFlow::Break(Some(invited)) if check.is_clean() => {
+                commit(writer).await?;
+                app.scheduler.changed();
+                let Some((name, secret)) = invited else {
+                    // Users who removed themselves can no longer see the study.
+                    return Ok(Redirect::to(&format!("/studies/{id}/members")).into_response());
+                };
+                let link = Some((name, format!("{}/sign-in/{secret}", origin(secure, &headers))));
+                let shown = AfterAction { link, ..AfterAction::default() };
+                return Ok(show(&app, &authorized.caller, id, shown).await?.into_response());
+            }
+            ControlFlow::Break(_) => break,
         }
-        Err(error @ (Error::Invalid(_) | Error::Conflict(_) | Error::Forbidden(_))) => {
-            drop(writer);
-            let shown = AfterAction { refused: Some(form_errors::in_words(&error)), typed: form.name, link: None };
-            Ok((Problem::from(&error).status(), show(&app, &authorized.caller, id, shown).await?).into_response())
-        }
-        Err(error) => Err(error.into()),
     }
+    let refused = check.into_refused();
+    let status = refused.status();
+    let shown = AfterAction { refused, typed: form, link: None };
+    Ok((status, show(&app, &authorized.caller, id, shown).await?).into_response())
 }
 
 /// Performs the action; returns name and secret of a sign-in link, if it created one.

@@ -14,6 +14,7 @@ mod disk_space_notice;
 mod explanation;
 mod figures;
 mod gait;
+mod gait_forms;
 mod gait_summary;
 mod help;
 mod home;
@@ -73,7 +74,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/{id}/details", get(study_details::get).post(study_details::post))
         .route("/studies/{id}/do", post(study::post))
         .route("/studies/{id}/compare", get(compare::get).post(compare::post))
-        .route("/studies/{id}/retract", post(compare_answer::retract))
+        .route("/studies/{id}/retract", post(compare::retract))
         .route("/studies/{id}/undo", post(compare::undo))
         .route("/studies/{id}/members", get(members::get).post(members::post))
         .route("/subjects", get(subjects::list).post(subjects::add))
@@ -89,9 +90,9 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/trials/{id}/certify", post(certificate::post))
         .route("/trials/{id}/explain", post(explanation::post))
         .route("/trials/{id}/relaxed-trial", post(explanation::try_relaxed))
-        .route("/trials/{id}/execution-report", post(simulated_walks::post))
-        .route("/trials/{id}/safety-report", post(safety_review::report))
-        .route("/trials/{id}/safety-review", post(safety_review::post))
+        .route("/trials/{id}/execution-report", post(gait_forms::simulate))
+        .route("/trials/{id}/safety-report", post(gait_forms::report))
+        .route("/trials/{id}/safety-review", post(gait_forms::review))
         .route("/reference-gaits", get(reference_gaits::list).post(reference_gaits::import))
         .route("/reference-gaits/{id}", get(reference_gaits::get))
         .route("/rate", get(rate::list))

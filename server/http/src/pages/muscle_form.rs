@@ -8,7 +8,7 @@ use crate::extractors::{Form, FormFields, Params};
 use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -17,7 +17,7 @@ use gait_optimizer::muscle::{MuscleField, MuscleOverride, MuscleParameters};
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::subject;
-use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::subjects::{self, SubjectRow};
 use gaitwright_store::{SubjectId, commit};
 use serde_json::{Map, Value, json};
 
@@ -35,7 +35,7 @@ const KINDS: [(&str, &str); 7] = [
 #[derive(Template)]
 #[template(path = "muscles.html")]
 struct MusclesPage {
-    subject: Subject,
+    subject: SubjectRow,
     columns: [MuscleField; 7],
     rows: Vec<MuscleRow>,
     scaled_to_body: bool,
@@ -61,7 +61,7 @@ struct ParameterCell {
 
 /// Shows the values in force, or the entries of a refused form.
 fn shown(
-    subject: Subject,
+    subject: SubjectRow,
     muscles: &MuscleParameters,
     may_run: bool,
     refusal: Option<(&FormFields, RefusedFields)>,
@@ -98,6 +98,8 @@ fn label(muscle: &str, column: &MuscleField) -> String {
 struct TypedMuscles(FormFields);
 
 impl TypedForm for TypedMuscles {
+    const LABELS: FieldLabels = &[];
+
     fn labels(&self) -> Vec<(String, String)> {
         let of_muscle = |&(kind, name): &(&str, &str)| {
             MuscleOverride::FIELDS.map(|column| (format!("{kind}_{}", column.name), label(name, &column)))

@@ -7,7 +7,7 @@ use crate::authorization::Authorized;
 use crate::blind_motion::{blind_stride, phase};
 use crate::extractors::{Form, Params};
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
+use crate::refused_fields::{FieldLabels, RefusedFields};
 use askama::Template;
 use axum::extract::{Path, State};
 use axum::response::{IntoResponse, Redirect, Response};
@@ -100,7 +100,7 @@ struct PairPage {
     /// The answer, if there is one.
     saved: Option<SavedBlindAnswer>,
     /// Why the form was refused.
-    refused: Option<String>,
+    refused: RefusedFields,
     /// Both strides; `None` if they cannot be drawn.
     strides: Option<[ShownStride; 2]>,
 }
@@ -236,10 +236,10 @@ pub(super) async fn pair(
     State(mut app): State<AppState>,
     Path(code): Path<String>,
 ) -> PageResult {
-    show(&mut app, &authorized.caller, &code, None).await
+    show(&mut app, &authorized.caller, &code, RefusedFields::default()).await
 }
 
-async fn show(app: &mut AppState, caller: &Caller, code: &str, refused: Option<String>) -> PageResult {
+async fn show(app: &mut AppState, caller: &Caller, code: &str, refused: RefusedFields) -> PageResult {
     let mut reader = app.read().await?;
     let shown = blind::own(&mut reader, caller, code).await?;
     let (code, number) = (shown.pair.code.clone(), shown.pair.number);
@@ -271,6 +271,9 @@ async fn show(app: &mut AppState, caller: &Caller, code: &str, refused: Option<S
     let strides = strides.await.map_err(Error::from)?;
     page(&PairPage { code, number, not_blind, saved: None, refused, strides })
 }
+
+/// The fields of the form of a pair.
+const FIELDS: FieldLabels = &[("note", "Note")];
 
 /// The form of a pair.
 #[derive(Debug, Deserialize)]
@@ -335,10 +338,9 @@ async fn redirected(
             let reported = if reported { "&reported=true" } else { "" };
             Ok(Redirect::to(&format!("/rate?saved={code}{reported}")).into_response())
         }
-        Err(error @ Error::Conflict(_)) => {
-            let shown = show(app, caller, code, Some(error.to_string())).await?;
-            Ok((Problem::from(&error).status(), shown).into_response())
+        Err(error) => {
+            let refused = RefusedFields::of(error, FIELDS)?;
+            Ok((refused.status(), show(app, caller, code, refused).await?).into_response())
         }
-        Err(other) => Err(other.into()),
     }
 }

@@ -5,7 +5,9 @@ use super::page_chart::{PageChart, shared_legend};
 use crate::figures::recording_traces::{StrideSpan, trace};
 use crate::figures::{lab_charts, reference_figures};
 use crate::form_errors;
+use crate::refused_fields::FieldLabels;
 use gaitwright_charts::{Chart, gait_charts};
+use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{EmgPreview, JointAnglePreview, Stride};
 use gaitwright_service::studies::reference_preview::ReferencePreview;
 
@@ -58,7 +60,7 @@ impl RecordingPreview {
     }
 
     /// An EMG recording.
-    pub(super) fn of_emg(preview: &EmgPreview) -> Self {
+    pub(super) fn of_emg(preview: &EmgPreview, labels: FieldLabels) -> Self {
         let left_out = |stride: &Stride| stride.rejected || !stride.is_plausible;
         let span = |stride: &Stride| StrideSpan {
             number: stride.number as usize,
@@ -81,12 +83,12 @@ impl RecordingPreview {
             Stride { is_plausible: false, .. } => "left out: too short or too long",
             Stride { .. } => "used",
         };
-        let refused = preview.refused.iter().map(form_errors::in_words).collect();
+        let refused = in_words(&preview.refused, labels);
         Self { refused, can_reject: true, ..Self::new(&charts, &strides, usage) }
     }
 
     /// Joint angles of a walk in the lab.
-    pub(super) fn of_joint_angles(preview: &JointAnglePreview) -> Self {
+    pub(super) fn of_joint_angles(preview: &JointAnglePreview, labels: FieldLabels) -> Self {
         let strides = reference_figures::stride_spans(&preview.strides);
         let chart = |(joint, points): &(&str, Vec<(f64, f64)>)| {
             trace((lab_charts::joint_name(joint), "angle, °", "recorded"), points, &preview.strikes_s, &strides)
@@ -95,12 +97,12 @@ impl RecordingPreview {
         let usage = |place: usize| {
             if preview.strides[place].is_used { "plausible" } else { "too short, too long, or with a gap" }
         };
-        let refused = preview.refused.iter().map(form_errors::in_words).collect();
+        let refused = in_words(&preview.refused, labels);
         Self { refused, ..Self::new(&charts, &strides, usage) }
     }
 
     /// A recording for a reference gait.
-    pub(super) fn of_reference(preview: &ReferencePreview) -> Self {
+    pub(super) fn of_reference(preview: &ReferencePreview, labels: FieldLabels) -> Self {
         let strides = reference_figures::stride_spans(&preview.strides);
         let charts = preview.traces.iter();
         let charts: Vec<Chart> = charts
@@ -114,9 +116,13 @@ impl RecordingPreview {
                 let charts = gait_charts::of_reference(found).iter().map(PageChart::new).collect();
                 (charts, Vec::new(), found.warning().ok().flatten())
             }
-            Err(error) => (Vec::new(), vec![form_errors::in_words(error)], None),
+            Err(error) => (Vec::new(), vec![form_errors::of_form(error, labels)], None),
         };
         let mean_legend = shared_legend(&mut mean);
         Self { refused, warning, mean, mean_legend, ..Self::new(&charts, &strides, usage) }
     }
+}
+
+fn in_words(refused: &[Error], labels: FieldLabels) -> Vec<String> {
+    refused.iter().map(|error| form_errors::of_form(error, labels)).collect()
 }

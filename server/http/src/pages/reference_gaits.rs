@@ -9,7 +9,7 @@ use crate::extractors::{Form as Submitted, Params};
 use crate::figures::reference_figures;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
@@ -19,8 +19,8 @@ use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};
-use gaitwright_store::reference_gaits::{self, ReferenceGait};
-use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::reference_gaits::{self, ReferenceGaitRow};
+use gaitwright_store::subjects::{self, SubjectRow};
 use gaitwright_store::{Connection, ReferenceGaitId, SubjectId, commit};
 use serde::Deserialize;
 use std::str::FromStr;
@@ -83,17 +83,19 @@ impl ReferenceGaitFields {
 }
 
 impl TypedForm for ReferenceGaitFields {
+    const LABELS: FieldLabels = &[
+        ("name", "Name"),
+        ("height_m", "Height of the measured person"),
+        ("body_mass_kg", "Body mass"),
+        ("recording", "File contents"),
+        ("heel_strikes_s", "Times of right heel strikes, s"),
+        ("unit", "Angle unit of an OpenSim file"),
+        ("force_column", "Column of the vertical force under the right foot"),
+        ("forces", "Contents of the force file"),
+    ];
+
     fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[
-            ("name", "Name"),
-            ("height_m", "Height of the measured person, m"),
-            ("body_mass_kg", "Body mass, kg"),
-            ("recording", "File contents"),
-            ("heel_strikes_s", "Times of right heel strikes, s"),
-            ("unit", "Angle unit of an OpenSim file"),
-            ("force_column", "Column of the vertical force under the right foot"),
-            ("forces", "Contents of the force file"),
-        ])
+        self.units.with_headings(Self::LABELS)
     }
 
     fn repair(&mut self, field: &str) -> bool {
@@ -118,9 +120,9 @@ fn number(field: &str, text: &str) -> Result<f64, Error> {
 struct ReferenceGaitsPage {
     units: Units,
     matches: Vec<ReferenceGaitMatch>,
-    subjects: Vec<Subject>,
+    subjects: Vec<SubjectRow>,
     /// The subject from whom distances are measured.
-    nearest_to: Option<Subject>,
+    nearest_to: Option<SubjectRow>,
     may_run: bool,
     fields: ReferenceGaitFields,
     refused: RefusedFields,
@@ -153,7 +155,7 @@ impl ReferenceGaitsPage {
         })
     }
 
-    fn is_nearest_to(&self, subject: &Subject) -> bool {
+    fn is_nearest_to(&self, subject: &SubjectRow) -> bool {
         self.nearest_to.as_ref().is_some_and(|chosen| chosen.id == subject.id)
     }
 }
@@ -188,7 +190,7 @@ pub(super) async fn import(
     let mut preview = None;
     match new {
         Some(new) if fields.button == "preview" => {
-            let of = move |_: &OnPool| Ok(RecordingPreview::of_reference(&new.preview()?));
+            let of = move |_: &OnPool| Ok(RecordingPreview::of_reference(&new.preview()?, ReferenceGaitFields::LABELS));
             match app.compute(of).await.map_err(Error::from)? {
                 Ok(found) => preview = Some(found),
                 Err(error) => check.refuse(error).map(drop)?,
@@ -216,7 +218,7 @@ pub(super) async fn import(
 #[template(path = "reference_gait.html")]
 struct ReferenceGaitPage {
     units: Units,
-    reference: ReferenceGait,
+    reference: ReferenceGaitRow,
     /// Curves that differ from the built-in reference gait.
     warning: Option<String>,
     steps: Vec<String>,

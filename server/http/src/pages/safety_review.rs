@@ -1,68 +1,88 @@
-//! The forms for a safety report and a safety review on the page of a gait.
+//! The forms for a safety report and a safety review on the page of a gait, as typed.
 
-use crate::AppState;
-use crate::accessible::Id;
-use crate::authorization::Authorized;
-use crate::extractors::Form;
-use crate::page_error::PageError;
-use axum::extract::State;
-use axum::response::Redirect;
-use gaitwright_service::access;
+use crate::refused_fields::{FieldLabels, TypedForm};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::new_safety_report::{self, NewSafetyReport};
-use gaitwright_service::studies::safety_review::{self, Decision};
+use gaitwright_service::studies::new_safety_report::NewSafetyReport;
+use gaitwright_service::studies::safety_review::Decision;
+use gaitwright_store::SafetyReportId;
 use gaitwright_store::safety_reviews::SafetyDecision;
-use gaitwright_store::{SafetyReportId, TrialId, commit};
 use serde::Deserialize;
 
 /// The form for a review.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Reviewed {
-    decision: SafetyDecision,
-    reason: String,
-    author: String,
+pub(super) struct ReviewFields {
+    #[serde(default)]
+    pub(super) decision: String,
+    #[serde(default)]
+    pub(super) author: String,
+    #[serde(default)]
+    pub(super) reason: String,
     /// The reports that the page showed, separated by commas.
     reports: String,
 }
 
-impl Reviewed {
-    fn read(self) -> Result<Decision, Error> {
+impl ReviewFields {
+    pub(super) fn read(&self) -> Result<Decision, Error> {
+        let decision = match self.decision.as_str() {
+            "unsafe" => SafetyDecision::Unsafe,
+            "cleared" => SafetyDecision::Cleared,
+            other => return Err(Error::invalid("decision", other, "one of the decisions on the form")),
+        };
         let identifier = |text: &str| {
             text.parse()
                 .map_err(|_| Error::invalid("reports", text, "the identifier of a safety report from this form"))
         };
         let reports = self.reports.split(',').map(identifier).collect::<Result<Vec<SafetyReportId>, _>>()?;
-        let Self { decision, reason, author, .. } = self;
-        Ok(Decision { decision, reason, author: Some(author), reports: Some(reports) })
+        let (reason, author) = (self.reason.clone(), Some(self.author.clone()));
+        Ok(Decision { decision, reason, author, reports: Some(reports) })
     }
 }
 
-/// `POST /trials/{id}/safety-review`.
-pub(super) async fn post(
-    authorized: Authorized<access::Answer>,
-    State(app): State<AppState>,
-    Id(id, _): Id<TrialId, access::Answer>,
-    Form(form): Form<Reviewed>,
-) -> Result<Redirect, PageError> {
-    let decision = form.read()?;
-    let mut writer = app.write().await?;
-    safety_review::give(&mut writer, &authorized.caller, id, &decision).await?;
-    commit(writer).await?;
-    app.scheduler.changed();
-    Ok(Redirect::to(&format!("/trials/{id}")))
+impl TypedForm for ReviewFields {
+    const LABELS: FieldLabels = &[("decision", "Decision"), ("author", "Your name or code"), ("reason", "Reason")];
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "decision" => "unsafe".clone_into(&mut self.decision),
+            "author" => "a name".clone_into(&mut self.author),
+            "reason" => "a reason".clone_into(&mut self.reason),
+            _ => return false,
+        }
+        true
+    }
 }
 
-/// `POST /trials/{id}/safety-report`.
-pub(super) async fn report(
-    authorized: Authorized<access::Answer>,
-    State(app): State<AppState>,
-    Id(id, _): Id<TrialId, access::Answer>,
-    Form(form): Form<NewSafetyReport>,
-) -> Result<Redirect, PageError> {
-    let mut writer = app.write().await?;
-    new_safety_report::give(&mut writer, &authorized.caller, id, &form).await?;
-    commit(writer).await?;
-    app.scheduler.changed();
-    Ok(Redirect::to(&format!("/trials/{id}")))
+/// The form for a report.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ReportFields {
+    /// Absent if a user is signed in.
+    author: Option<String>,
+    #[serde(default)]
+    pub(super) note: String,
+}
+
+impl ReportFields {
+    pub(super) fn new_report(&self) -> NewSafetyReport {
+        NewSafetyReport { source: None, author: self.author.clone(), note: self.note.clone() }
+    }
+
+    /// The author as typed.
+    pub(super) fn author(&self) -> &str {
+        self.author.as_deref().unwrap_or_default()
+    }
+}
+
+impl TypedForm for ReportFields {
+    const LABELS: FieldLabels = &[("author", "Your name or code"), ("note", "What happened")];
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            "author" => self.author = Some("a name".to_owned()),
+            "note" => self.note.clear(),
+            _ => return false,
+        }
+        true
+    }
 }

@@ -4,23 +4,24 @@ use super::unsent_form::{SignInPage, Unsent, send_now};
 use crate::authentication::{cookie, session_of};
 use crate::authorization::{SignedIn, not_signed_in};
 use crate::extractors::Form;
-use crate::form_errors;
 use crate::format;
 use crate::known_browser::{self, BrowserSecret};
 use crate::page_error::{PageError, PageResult, page};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use crate::{AppState, ClientAddress};
 use askama::Template;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Redirect, Response};
-use gaitwright_service::access::back_off::{self, Origin, PasswordAttempt};
+use gaitwright_service::access::back_off::{self, AttemptOrigin, PasswordAttempt};
 use gaitwright_service::access::{Caller, Role, password, secret, session, sign_in, user_administration};
-use gaitwright_service::error::Error;
+use gaitwright_service::error::{Error, FieldError};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::sessions::{Session, SignInOrigin};
 use gaitwright_store::users::User;
 use gaitwright_store::{BorrowedWriter, Connection, Instant, UserId, Writer, commit, sessions, users};
 use serde::Deserialize;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 #[derive(Template)]
@@ -43,13 +44,13 @@ struct AccountPage {
     must_confirm_password: bool,
     /// The sessions of the user, and whether each is the current one.
     sessions: Vec<(Session, bool)>,
-    refused: Option<String>,
+    refused: RefusedFields,
     saved: bool,
 }
 
 /// `GET /sign-in`.
 pub(super) async fn get() -> PageResult {
-    page(&SignInPage { refused: None, name: String::new(), unsent: Unsent::default() })
+    page(&SignInPage { refused: RefusedFields::default(), name: String::new(), unsent: Unsent::default() })
 }
 
 /// Name and password, and an entry that was sent before signing in.
@@ -78,9 +79,9 @@ impl Visit {
     }
 
     /// The origin of an attempt to sign in with a name.
-    async fn origin(&self, writer: &mut Writer, user: Option<&User>) -> Result<Origin, Error> {
+    async fn origin(&self, writer: &mut Writer, user: Option<&User>) -> Result<AttemptOrigin, Error> {
         let known = self.kept.recognised(writer, user).await?;
-        Ok(Origin { network: self.address.network(), site: self.address.site(), known })
+        Ok(AttemptOrigin { network: self.address.network(), site: self.address.site(), known })
     }
 
     /// The secret of the browser's cookie, and the origin that a new session records.
@@ -154,7 +155,8 @@ pub(super) async fn post(
             return Ok((cookies(&app, &session, &kept)?, answer).into_response());
         }
     }
-    let refused = Some("Wrong name or password.".to_owned());
+    // Nothing says which of the two is wrong.
+    let refused = RefusedFields::without_field("Wrong name or password.");
     Ok((StatusCode::UNAUTHORIZED, page(&SignInPage { refused, name, unsent: form.unsent })?).into_response())
 }
 
@@ -176,7 +178,11 @@ pub(super) async fn use_link(
         Err(Error::NotSignedIn(reason)) => {
             // An expired link stays expired, so the page need not be retried.
             commit(writer).await?;
-            let refused = SignInPage { refused: Some(reason), name: String::new(), unsent: Unsent::default() };
+            let refused = SignInPage {
+                refused: RefusedFields::without_field(&reason),
+                name: String::new(),
+                unsent: Unsent::default(),
+            };
             let refused = page(&refused)?;
             return Ok((StatusCode::UNAUTHORIZED, refused).into_response());
         }
@@ -235,18 +241,26 @@ async fn account_of(
         shortest: password::SHORTEST,
         must_confirm_password: sign_in::must_confirm_password(&mut reader, &user, session_of(headers)).await?,
         sessions: own_sessions(&mut reader, app, user.id, session_of(headers), now).await?,
-        refused: None,
+        refused: RefusedFields::default(),
         saved: false,
     };
     Ok((shown, user, caller.actor.clone()))
 }
 
 /// A new password, and the current one if the form asks for it.
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 pub(super) struct NewPassword {
     password: String,
     #[serde(default)]
     present: String,
+}
+
+impl TypedForm for NewPassword {
+    const LABELS: FieldLabels = &[("present", "Current password"), ("password", "New password")];
+
+    fn repair(&mut self, _: &str) -> bool {
+        false
+    }
 }
 
 /// `POST /account`: sets the password, and ends every other session of the person.
@@ -258,24 +272,29 @@ pub(super) async fn set_password(
     Form(form): Form<NewPassword>,
 ) -> Result<Response, PageError> {
     let (mut shown, user, actor) = account_of(&app, caller.as_ref(), &headers).await?;
-    let visit = Visit::of(address, &headers);
+    let (visit, mut check) = (Visit::of(address, &headers), FormCheck::new(&form));
     if shown.must_confirm_password {
         // Wrong passwords count as failed sign-ins.
         let right = compare(&app, &visit, &user.name, Some(&user), form.present).await?.map_err(too_many)?;
-        let Some((mut writer, attempt)) = right else {
-            shown.refused = Some("The current password is wrong.".to_owned());
-            return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
-        };
-        attempt.succeeded(&mut writer).await?;
-        commit(writer).await?;
+        match right {
+            Some((mut writer, attempt)) => {
+                attempt.succeeded(&mut writer).await?;
+                commit(writer).await?;
+            }
+            None => {
+                let wrong = FieldError::in_words("present", "The current password is wrong.");
+                check.refuse(Error::Invalid(Box::new(wrong)))?;
+            }
+        }
     }
     let name = user.name.clone();
-    let hashed = match secret::on_blocking_thread(move || secret::hash_password_of(&name, &form.password)).await? {
-        Err(Error::Invalid(field)) => {
-            shown.refused = Some(form_errors::with_label(*field).message);
-            return Ok((StatusCode::UNPROCESSABLE_ENTITY, page(&shown)?).into_response());
+    let hashed = secret::on_blocking_thread(move || secret::hash_password_of(&name, &form.password)).await?;
+    let hashed = match check.step(hashed)? {
+        ControlFlow::Break(Some(hashed)) if check.is_clean() => hashed,
+        _ => {
+            shown.refused = check.into_refused();
+            return Ok((shown.refused.status(), page(&shown)?).into_response());
         }
-        hashed => hashed?,
     };
     let (kept, from) = visit.begins()?;
     let (mut writer, now) = app.write_access().await?;

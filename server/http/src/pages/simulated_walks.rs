@@ -1,29 +1,21 @@
-//! Simulated walks on the page of a gait, and the form that requests them.
+//! Simulated walks on the page of a gait, and the fields of the form that requests them.
 
-use crate::AppState;
-use crate::accessible::Id;
-use crate::authorization::Authorized;
-use crate::extractors::Form;
 use crate::format;
-use crate::page_error::PageError;
-use axum::extract::State;
-use axum::response::Redirect;
+use crate::refused_fields::{FieldLabels, TypedForm};
 use gait_optimizer::execution::{ExecutionReport, SimulatedWalksOnGround};
-use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::execution::{MOST_SIMULATED_WALKS, NewExecutionReport, Simulation};
-use gaitwright_service::studies::execution_request;
 use gaitwright_service::studies::seed::LARGEST_SEED;
+use gaitwright_store::Instant;
 use gaitwright_store::execution_reports::{ExecutionReported, StoredReport};
-use gaitwright_store::{Instant, TrialId, commit};
 use serde::Deserialize;
 
 /// The section: the newest report, and the state of a requested one.
-pub(super) struct SimulatedWalks {
+pub(super) struct SimulatedWalksSection {
     pub(super) state: Simulation,
     pub(super) shown: Option<ShownReport>,
-    /// What the form suggests.
-    pub(super) suggested: NewExecutionReport,
+    /// The form as typed, or what it suggests.
+    pub(super) fields: SimulationFields,
 }
 
 /// An execution report in words.
@@ -47,9 +39,10 @@ pub(super) struct GroundRow {
     pub(super) ankle: String,
 }
 
-impl SimulatedWalks {
-    pub(super) fn new(state: Simulation, kept: Option<StoredReport>) -> Self {
-        Self { state, shown: kept.map(ShownReport::new), suggested: NewExecutionReport::default() }
+impl SimulatedWalksSection {
+    pub(super) fn new(state: Simulation, kept: Option<StoredReport>, typed: Option<SimulationFields>) -> Self {
+        let fields = typed.unwrap_or_else(|| NewExecutionReport::default().into());
+        Self { state, shown: kept.map(ShownReport::new), fields }
     }
 
     /// Whether a report is queued or running.
@@ -68,8 +61,10 @@ impl SimulatedWalks {
 
 impl ShownReport {
     fn new(kept: StoredReport) -> Self {
-        let StoredReport { reported: ExecutionReported { simulated_walks, seed, program, report, .. }, created_at } =
-            kept;
+        let StoredReport {
+            reported: ExecutionReported { number_of_simulated_walks, seed, program, report, .. },
+            created_at,
+        } = kept;
         let of_strides = |strides: u32| format!("{strides} of {}", report.strides);
         let by_yield = report.strides_by_yield.iter();
         let by_yield: Vec<String> = by_yield
@@ -83,7 +78,7 @@ impl ShownReport {
             (
                 "Disturbed simulated walks",
                 format!(
-                    "{simulated_walks} on each kind of ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"
+                    "{number_of_simulated_walks} on each kind of ground, seed {seed}, body mass {lightest:.1} to {heaviest:.1} kg"
                 ),
             ),
             ("Gait (SHA-256)", report.gait_sha256.clone()),
@@ -112,7 +107,7 @@ impl GroundRow {
         let [low, high] = on.completed_share_interval;
         Self {
             ground: on.ground_in_words(),
-            complete: format!("{} of {}", on.completed, on.simulated_walks),
+            complete: format!("{} of {}", on.completed, on.number_of_simulated_walks),
             share: format!("{} ({} to {})", percent(on.completed_share), percent(low), percent(high)),
             strides: format!("{:.1}", on.mean_strides),
             ended: format!("{}, {}", on.fell, on.halted),
@@ -123,42 +118,51 @@ impl GroundRow {
 }
 
 /// The fields of the form.
-#[derive(Debug, Deserialize)]
-pub(super) struct WalksFields {
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct SimulationFields {
     #[serde(default)]
-    simulated_walks: String,
+    pub(super) number_of_simulated_walks: String,
     #[serde(default)]
-    seed: String,
+    pub(super) seed: String,
 }
 
-impl WalksFields {
-    fn request(&self) -> Result<NewExecutionReport, Error> {
-        let walks = self.simulated_walks.trim().parse();
+impl SimulationFields {
+    pub(super) fn request(&self) -> Result<NewExecutionReport, Error> {
+        let walks = self.number_of_simulated_walks.trim().parse();
         let seed = self.seed.trim().parse();
-        Ok(NewExecutionReport {
-            simulated_walks: walks.map_err(|_| {
+        let asked = NewExecutionReport {
+            number_of_simulated_walks: walks.map_err(|_| {
                 Error::invalid(
-                    "simulated_walks",
-                    self.simulated_walks.as_str(),
+                    "number_of_simulated_walks",
+                    self.number_of_simulated_walks.as_str(),
                     &format!("1 to {MOST_SIMULATED_WALKS}"),
                 )
             })?,
             seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {LARGEST_SEED}")))?,
-        })
+        };
+        asked.options()?;
+        Ok(asked)
     }
 }
 
-/// `POST /trials/{id}/execution-report`.
-pub(super) async fn post(
-    authorized: Authorized<Run>,
-    State(app): State<AppState>,
-    Id(id, _): Id<TrialId, Run>,
-    Form(fields): Form<WalksFields>,
-) -> Result<Redirect, PageError> {
-    let asked = fields.request()?;
-    let mut writer = app.write().await?;
-    execution_request::ask(&mut writer, &app.scheduler, &authorized.caller.actor, id, asked).await?;
-    commit(writer).await?;
-    app.scheduler.changed();
-    Ok(Redirect::to(&format!("/trials/{id}#simulated-walks")))
+impl From<NewExecutionReport> for SimulationFields {
+    fn from(suggested: NewExecutionReport) -> Self {
+        let NewExecutionReport { number_of_simulated_walks, seed } = suggested;
+        Self { number_of_simulated_walks: number_of_simulated_walks.to_string(), seed: seed.to_string() }
+    }
+}
+
+impl TypedForm for SimulationFields {
+    const LABELS: FieldLabels =
+        &[("number_of_simulated_walks", "Number of simulated walks on each kind of ground"), ("seed", "Seed")];
+
+    fn repair(&mut self, field: &str) -> bool {
+        let suggested = Self::from(NewExecutionReport::default());
+        match field {
+            "number_of_simulated_walks" => self.number_of_simulated_walks = suggested.number_of_simulated_walks,
+            "seed" => self.seed = suggested.seed,
+            _ => return false,
+        }
+        true
+    }
 }

@@ -92,7 +92,7 @@ pub(super) async fn get(
     let compared = match (a, b) {
         (Some(a), Some(b)) if a == b => {
             let message = "\u{201c}Study B\u{201d} is the same study as study A. Choose another one.";
-            refused = RefusedFields::of(FieldError::in_words("b", message).into())?;
+            refused = RefusedFields::of(FieldError::in_words("b", message).into(), &[])?;
             None
         }
         (Some(a), Some(b)) => {

@@ -6,7 +6,7 @@ use crate::accessible::Id;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
@@ -78,9 +78,7 @@ impl StudyDetailsFields {
 }
 
 impl TypedForm for StudyDetailsFields {
-    fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[("name", "Name"), ("tags", "Tags"), ("notes", "Notes")])
-    }
+    const LABELS: FieldLabels = &[("name", "Name"), ("tags", "Tags"), ("notes", "Notes")];
 
     fn repair(&mut self, field: &str) -> bool {
         match field {

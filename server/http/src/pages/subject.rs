@@ -7,7 +7,7 @@ use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::format::{variant, words};
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm, refused_once};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
@@ -20,7 +20,7 @@ use gaitwright_service::studies::lifecycle;
 use gaitwright_service::studies::subject::{self, NewCorrection};
 use gaitwright_store::consents::{self, Consent, ConsentKind};
 use gaitwright_store::studies::Study;
-use gaitwright_store::subjects::{self, Correction, Subject};
+use gaitwright_store::subjects::{self, Correction, SubjectRow};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, SubjectId, commit, lab_sessions, studies, trials};
 use serde::Deserialize;
@@ -32,7 +32,7 @@ const PAGE: u32 = 100;
 #[template(path = "subject.html")]
 struct SubjectPage {
     units: Units,
-    subject: Subject,
+    subject: SubjectRow,
     consents: Vec<Consent>,
     withdrawn: bool,
     may_run: bool,
@@ -78,7 +78,7 @@ struct Correcting {
 }
 
 impl Correcting {
-    fn of(subject: &Subject, units: Units) -> Self {
+    fn of(subject: &SubjectRow, units: Units) -> Self {
         let (height_m, body_mass_kg) = (units.height_entry(subject.height_m), units.mass_entry(subject.body_mass_kg));
         Self { height_m, body_mass_kg, reason: String::new(), refused: false }
     }
@@ -200,6 +200,11 @@ async fn sessions_of(db: &mut Connection, study: &Study) -> Result<Vec<SessionRo
     Ok(sessions.iter().rev().map(row).collect())
 }
 
+/// The label of a new consent.
+const CONSENT: FieldLabels = &[("form", "Signed consent form")];
+/// The label of the reason for a withdrawal.
+const WITHDRAWAL: FieldLabels = &[("reason", "Reason, or \u{201c}none given\u{201d}")];
+
 /// The form that was signed.
 #[derive(Debug, Deserialize)]
 pub(super) struct Signed {
@@ -216,7 +221,7 @@ pub(super) async fn consent(
     Form(form): Form<Signed>,
 ) -> Result<Response, PageError> {
     let typed = SentForm::Consent(form.form.clone());
-    let refused = refused_once(give(&app, &authorized, id, form).await)?;
+    let refused = refused_once(give(&app, &authorized, id, form).await, CONSENT)?;
     answer(&app, units, id, &authorized.caller, refused, typed).await
 }
 
@@ -249,7 +254,7 @@ pub(super) async fn withdraw(
             "Nothing was changed. First tick the box to confirm that all studies of this subject will be stopped.",
         ))
     };
-    answer(&app, units, id, &authorized.caller, refused_once(done)?, SentForm::Withdrawal(why.reason)).await
+    answer(&app, units, id, &authorized.caller, refused_once(done, WITHDRAWAL)?, SentForm::Withdrawal(why.reason)).await
 }
 
 /// The form of a withdrawal.
@@ -299,8 +304,10 @@ impl CorrectionForm {
 }
 
 impl TypedForm for CorrectionForm {
+    const LABELS: FieldLabels = &[("height_m", "Height"), ("body_mass_kg", "Body mass"), ("reason", "Reason")];
+
     fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[("height_m", "Height, m"), ("body_mass_kg", "Body mass, kg"), ("reason", "Reason")])
+        self.units.with_headings(Self::LABELS)
     }
 
     fn repair(&mut self, field: &str) -> bool {
@@ -355,11 +362,6 @@ async fn set_right(
     }
     subject::correct(&mut writer, &authorized.caller.actor, id, new).await?;
     Ok(commit(writer).await?)
-}
-
-/// The refusal of a form whose fields are checked once.
-fn refused_once(done: Result<(), Error>) -> Result<RefusedFields, Error> {
-    done.map_or_else(RefusedFields::of, |()| Ok(RefusedFields::default()))
 }
 
 /// Shows the subject again after a change, with the reasons if it was refused.

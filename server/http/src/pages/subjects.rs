@@ -4,7 +4,7 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields, TypedForm, labels_of};
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm};
 use crate::units::Units;
 use askama::Template;
 use axum::extract::State;
@@ -13,7 +13,7 @@ use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::subject::{self, NewSubject};
 use gaitwright_store::consents::{self, ConsentKind};
-use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::subjects::{self, SubjectRow};
 use gaitwright_store::{StudyId, SubjectId, commit};
 use serde::Deserialize;
 use std::ops::ControlFlow;
@@ -25,7 +25,7 @@ const PAGE: u32 = 100;
 #[template(path = "subjects.html")]
 struct SubjectsPage {
     units: Units,
-    subjects: Vec<SubjectRow>,
+    subjects: Vec<ListedSubject>,
     /// The last subject of this page, if more follow.
     next: Option<SubjectId>,
     may_run: bool,
@@ -53,13 +53,11 @@ impl SubjectFields {
 }
 
 impl TypedForm for SubjectFields {
+    const LABELS: FieldLabels =
+        &[("pseudonym", "Pseudonym"), ("height_m", "Height"), ("body_mass_kg", "Body mass"), ("notes", "Notes")];
+
     fn labels(&self) -> Vec<(String, String)> {
-        labels_of(&[
-            ("pseudonym", "Pseudonym"),
-            ("height_m", "Height, m"),
-            ("body_mass_kg", "Body mass, kg"),
-            ("notes", "Notes"),
-        ])
+        self.units.with_headings(Self::LABELS)
     }
 
     fn repair(&mut self, field: &str) -> bool {
@@ -86,8 +84,8 @@ pub(super) fn unused_pseudonym() -> String {
     hex.chars().filter_map(letter).collect()
 }
 
-struct SubjectRow {
-    subject: Subject,
+struct ListedSubject {
+    subject: SubjectRow,
     consent: &'static str,
     withdrawn: bool,
 }
@@ -164,7 +162,11 @@ async fn show_list(
         let consents = consents::of_subject(&mut reader, subject.id).await?;
         let last = consents.last();
         let withdrawn = last.is_some_and(|last| last.kind == ConsentKind::Withdrawn);
-        rows.push(SubjectRow { subject, consent: last.map_or("not on record", |last| last.kind.as_str()), withdrawn });
+        rows.push(ListedSubject {
+            subject,
+            consent: last.map_or("not on record", |last| last.kind.as_str()),
+            withdrawn,
+        });
     }
     page(&SubjectsPage { units, subjects: rows, next, may_run, fields, refused })
 }

@@ -6,6 +6,7 @@ use crate::AppState;
 use crate::authorization::SignedIn;
 use crate::extractors::unreadable;
 use crate::page_error::{PageError, is_for_programs, page};
+use crate::refused_fields::RefusedFields;
 use askama::Template;
 use axum::body::Bytes;
 use axum::extract::{FromRequest, Request, State};
@@ -40,7 +41,7 @@ impl Unsent {
 #[derive(Template)]
 #[template(path = "sign_in.html")]
 pub(super) struct SignInPage {
-    pub(super) refused: Option<String>,
+    pub(super) refused: RefusedFields,
     pub(super) name: String,
     pub(super) unsent: Unsent,
 }
@@ -79,7 +80,7 @@ pub(super) async fn keep(
     } else {
         Unsent::default()
     };
-    let refused = Some("You are no longer signed in. Your entry was not saved.".to_owned());
+    let refused = RefusedFields::without_field("You are no longer signed in. Your entry was not saved.");
     let shown = page(&SignInPage { refused, name: String::new(), unsent })?;
     Ok((StatusCode::UNAUTHORIZED, shown).into_response())
 }

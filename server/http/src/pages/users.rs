@@ -4,14 +4,13 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::client_address::Secure;
 use crate::extractors::Form;
-use crate::form_errors;
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::problem_details::Problem;
 use crate::qr_code;
+use crate::refused_fields::{FieldLabels, FormCheck, RefusedFields, TypedForm, labels_of};
 use askama::Template;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, header};
 use axum::response::{IntoResponse, Response};
 use gaitwright_service::access::tokens::{self as making, NewToken};
 use gaitwright_service::access::user_administration::{self, NewUser};
@@ -23,6 +22,7 @@ use gaitwright_store::tokens::Token;
 use gaitwright_store::users::User;
 use gaitwright_store::{SessionId, TokenId, UserId, Writer, commit, sessions, sign_in_failures, tokens, users};
 use serde::Deserialize;
+use std::ops::ControlFlow;
 use std::str::FromStr;
 
 /// The scopes of tokens. There is none for administration: only users administer.
@@ -51,59 +51,20 @@ struct UsersPage {
     roles: [Role; 3],
     scopes: [(Right, &'static str); 5],
     outcome: ActionOutcome,
-    refused: Option<RefusedEntry>,
+    refused: RefusedFields,
     /// The entries of a refused form. None of them is secret.
     entries: UsersForm,
 }
 
-/// Why a form was refused.
-struct RefusedEntry {
-    /// Which form.
-    button: String,
-    /// The refused field; `None` if no single field is at fault.
-    field: Option<&'static str>,
-    message: String,
-}
-
-/// The fields of both forms: name, form and label.
-const FIELDS: [(&str, &str, &str); 5] = [
-    ("name", "add_user", "Name or code"),
-    ("role", "add_user", "Role"),
-    ("name", "make_token", "Purpose"),
-    ("days", "make_token", "Expires after, days"),
-    ("scopes", "make_token", "Scopes"),
-];
-
-impl RefusedEntry {
-    fn of(error: &Error, button: &str) -> Self {
-        let find = |name: &str| FIELDS.iter().find(|(field, form, _)| *field == name && *form == button);
-        let (field, message) = match error {
-            Error::Invalid(fault) => match find(&fault.field) {
-                Some((field, _, label)) => (Some(*field), form_errors::of_field(label, fault)),
-                None => (None, error.to_string()),
-            },
-            // The only conflict that these forms can have is a name that is taken.
-            Error::Conflict(reason) => (find("name").map(|(field, _, _)| *field), reason.clone()),
-            _ => (None, error.to_string()),
-        };
-        Self { button: button.to_owned(), field, message }
-    }
-}
+/// The fields of the form that adds a user.
+const NEW_USER: FieldLabels = &[("name", "Name or code"), ("role", "Role")];
+/// The fields of the form that creates a token.
+const NEW_TOKEN: FieldLabels = &[("name", "Purpose"), ("days", "Expires after, days"), ("scopes", "Scopes")];
 
 impl UsersPage {
-    /// Why this field of this form was refused.
-    fn fault(&self, button: &str, field: &str) -> Option<&str> {
-        let refused = self.refused.as_ref()?;
-        (refused.button == button && refused.field == Some(field)).then_some(refused.message.as_str())
-    }
-
-    /// The attributes of a refused field.
+    /// The attributes of a field of this form. Two forms have a field `name`.
     fn invalid(&self, button: &str, field: &str) -> &'static str {
-        if self.fault(button, field).is_some() {
-            " aria-invalid=\"true\" aria-describedby=\"fault\" autofocus"
-        } else {
-            ""
-        }
+        if self.entries.button == button { self.refused.invalid(field) } else { "" }
     }
 
     /// The entry of a field, if its form was the refused one.
@@ -136,7 +97,7 @@ struct ActionOutcome {
 }
 
 /// The fields of every form of the page.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 pub(super) struct UsersForm {
     button: String,
     #[serde(default)]
@@ -170,12 +131,37 @@ impl UsersForm {
     }
 }
 
-/// `GET /users`.
-pub(super) async fn get(_: Authorized<Administer>, State(app): State<AppState>) -> PageResult {
-    show(&app, ActionOutcome::default(), None, UsersForm::default()).await
+impl TypedForm for UsersForm {
+    const LABELS: FieldLabels = &[];
+
+    fn labels(&self) -> Vec<(String, String)> {
+        labels_of(if self.button == "make_token" { NEW_TOKEN } else { NEW_USER })
+    }
+
+    fn repair(&mut self, field: &str) -> bool {
+        match field {
+            // A name that nobody has.
+            "name" => self.name = UserId::fresh().to_string(),
+            "role" => Role::Rater.as_str().clone_into(&mut self.role),
+            "days" => self.days.clear(),
+            "scopes" => self.read = Some("on".to_owned()),
+            _ => return false,
+        }
+        true
+    }
+
+    /// The only conflict of a new user or token is a name that is taken.
+    fn field_in_conflict(&self) -> Option<&'static str> {
+        ["add_user", "make_token"].contains(&self.button.as_str()).then_some("name")
+    }
 }
 
-async fn show(app: &AppState, outcome: ActionOutcome, refused: Option<RefusedEntry>, entries: UsersForm) -> PageResult {
+/// `GET /users`.
+pub(super) async fn get(_: Authorized<Administer>, State(app): State<AppState>) -> PageResult {
+    show(&app, ActionOutcome::default(), RefusedFields::default(), UsersForm::default()).await
+}
+
+async fn show(app: &AppState, outcome: ActionOutcome, refused: RefusedFields, entries: UsersForm) -> PageResult {
     let mut reader = app.read().await?;
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
     let now = app.access.clock.now(&mut reader).await?;
@@ -193,23 +179,25 @@ pub(super) async fn post(
     headers: HeaderMap,
     Form(form): Form<UsersForm>,
 ) -> Result<Response, PageError> {
-    let mut writer = app.write().await?;
     let origin = origin(secure, &headers);
-    match apply(&mut writer, &authorized.caller, &origin, &form).await {
-        Ok(outcome) => {
-            commit(writer).await?;
-            // Event streams check again whether their user still has access.
-            app.scheduler.changed();
-            Ok(show(&app, outcome, None, UsersForm::default()).await?.into_response())
+    let mut check = FormCheck::new(&form);
+    loop {
+        let mut writer = app.write().await?;
+        let applied = apply(&mut writer, &authorized.caller, &origin, check.form()).await;
+        match check.step(applied)? {
+            ControlFlow::Continue(()) => {}
+            ControlFlow::Break(Some(outcome)) if check.is_clean() => {
+                commit(writer).await?;
+                // Event streams check again whether their user still has access.
+                app.scheduler.changed();
+                let shown = show(&app, outcome, RefusedFields::default(), UsersForm::default()).await?;
+                return Ok(shown.into_response());
+            }
+            ControlFlow::Break(_) => break,
         }
-        Err(error) if error.is_input() => {
-            drop(writer);
-            let status = StatusCode::from_u16(Problem::from(&error).status).unwrap_or(StatusCode::BAD_REQUEST);
-            let refused = RefusedEntry::of(&error, &form.button);
-            Ok((status, show(&app, ActionOutcome::default(), Some(refused), form).await?).into_response())
-        }
-        Err(error) => Err(error.into()),
     }
+    let refused = check.into_refused();
+    Ok((refused.status(), show(&app, ActionOutcome::default(), refused, form).await?).into_response())
 }
 
 /// The address under which the browser reaches this service, as in `https://gait.clinic.example`. Unknown host names were

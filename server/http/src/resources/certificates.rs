@@ -155,16 +155,36 @@ impl From<certificate::Check> for CertificateCheck {
     }
 }
 
+/// Largest differences between the gait's initial state and the fixed point of the closed loop.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) struct FixedPointDistance {
+    /// In the height of the hip, m.
+    height_m: f64,
+    /// In an angle, rad.
+    angle_rad: f64,
+    /// In a velocity of the hip, m/s.
+    velocity_m_s: f64,
+    /// In an angular velocity, rad/s.
+    angular_velocity_rad_s: f64,
+}
+
+impl From<certificate::FixedPointDistance> for FixedPointDistance {
+    fn from(distance: certificate::FixedPointDistance) -> Self {
+        let certificate::FixedPointDistance { height_m, angle_rad, velocity_m_s, angular_velocity_rad_s } = distance;
+        Self { height_m, angle_rad, velocity_m_s, angular_velocity_rad_s }
+    }
+}
+
 /// Stability of a gait, from the stride-to-stride map.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ReturnMap {
-    /// Largest change in a coordinate or velocity over one stride that starts at the gait's initial state, rad and
-    /// rad/s.
+    /// Largest change in a component of the state (m, rad, m/s or rad/s) over one stride that starts at the gait's initial
+    /// state.
     gait_residual: f64,
-    /// Largest change of the state over one stride from the nearby fixed point of the closed loop, rad and rad/s.
+    /// The same for a stride from the nearby fixed point of the closed loop.
     fixed_point_residual: f64,
-    /// Largest component of the difference between the gait's initial state and the fixed point, rad and rad/s.
-    fixed_point_distance: f64,
+    /// Distance between the gait's initial state and the fixed point.
+    fixed_point_distance: FixedPointDistance,
     /// Multipliers from variational equations and saltation matrices, largest first.
     multipliers: Vec<FloquetMultiplier>,
     /// Largest modulus of the multipliers.
@@ -195,7 +215,7 @@ impl From<certificate::ReturnMap> for ReturnMap {
         Self {
             gait_residual,
             fixed_point_residual,
-            fixed_point_distance,
+            fixed_point_distance: fixed_point_distance.into(),
             multipliers: multipliers.into_iter().map(Into::into).collect(),
             largest,
             largest_by_differences,

@@ -20,9 +20,9 @@ pub(crate) struct Device {
     created_at: Instant,
 }
 
-impl From<devices::Device> for Device {
-    fn from(row: devices::Device) -> Self {
-        let devices::Device { id, name, definition, created_at } = row;
+impl From<devices::DeviceRow> for Device {
+    fn from(row: devices::DeviceRow) -> Self {
+        let devices::DeviceRow { id, name, definition, created_at } = row;
         Self { id, name, definition, created_at }
     }
 }

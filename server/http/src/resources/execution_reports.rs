@@ -62,7 +62,7 @@ pub(crate) struct SimulatedWalksOnGround {
     /// Largest height of bumps and depth of dips in the ground, m.
     ground_height_m: f64,
     /// Number of simulated walks.
-    simulated_walks: u32,
+    number_of_simulated_walks: u32,
     /// Simulated walks that completed all strides.
     completed: u32,
     /// Simulated walks that ended with a fall.
@@ -92,7 +92,7 @@ impl From<execution::SimulatedWalksOnGround> for SimulatedWalksOnGround {
     fn from(ground: execution::SimulatedWalksOnGround) -> Self {
         let execution::SimulatedWalksOnGround {
             ground_height_m,
-            simulated_walks,
+            number_of_simulated_walks,
             completed,
             fell,
             halted,
@@ -106,7 +106,7 @@ impl From<execution::SimulatedWalksOnGround> for SimulatedWalksOnGround {
         } = ground;
         Self {
             ground_height_m,
-            simulated_walks,
+            number_of_simulated_walks,
             completed,
             fell,
             halted,

@@ -1,17 +1,16 @@
-//! Preferences and suggestions, and their retractions.
+//! Preferences and their retractions.
 
-use gait_learner::ActionIndex;
+use gaitwright_service::error::Error;
 use gaitwright_store::feedback::{self, Source};
-use gaitwright_store::trials::Label;
 use gaitwright_store::{AnswerId, FeedbackId, Instant, StudyId, TrialId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// A preference or a suggestion of a study.
+/// A preference of a study.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Preference {
     /// Sequence number.
-    seq: i64,
+    pub(crate) seq: i64,
     /// Identifier.
     id: FeedbackId,
     /// Identifier of the study.
@@ -39,8 +38,11 @@ pub(crate) struct Preference {
     retraction: Option<Retraction>,
 }
 
-impl From<feedback::FeedbackRow> for Preference {
-    fn from(row: feedback::FeedbackRow) -> Self {
+impl TryFrom<feedback::FeedbackRow> for Preference {
+    type Error = Error;
+
+    /// The label of a trial and a suggestion are not found.
+    fn try_from(row: feedback::FeedbackRow) -> Result<Self, Error> {
         let feedback::FeedbackRow {
             seq,
             id,
@@ -56,11 +58,13 @@ impl From<feedback::FeedbackRow> for Preference {
             created_at,
             retraction,
         } = row;
-        Self {
+        let content = PreferenceContent::of(&content)
+            .ok_or_else(|| Error::NotFound { what: "preference".to_owned(), id: id.to_string() })?;
+        Ok(Self {
             seq,
             id,
             study_id,
-            content: content.into(),
+            content,
             source,
             author,
             note,
@@ -70,7 +74,7 @@ impl From<feedback::FeedbackRow> for Preference {
             restores,
             created_at,
             retraction: retraction.map(Into::into),
-        }
+        })
     }
 }
 
@@ -78,13 +82,6 @@ impl From<feedback::FeedbackRow> for Preference {
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub(crate) enum PreferenceContent {
-    /// Label of a trial.
-    Label {
-        /// Identifier of the trial.
-        trial: TrialId,
-        /// Whether the evaluation found a gait.
-        label: Label,
-    },
     /// One trial is better than another.
     Preference {
         /// Better trial.
@@ -99,23 +96,15 @@ pub(crate) enum PreferenceContent {
         /// The other trial.
         b: TrialId,
     },
-    /// An action would have been better than a trial.
-    Suggestion {
-        /// Index of the suggested action.
-        #[schema(value_type = u64)]
-        suggested: ActionIndex,
-        /// Trial to which the suggested action is preferred.
-        over: TrialId,
-    },
 }
 
-impl From<feedback::FeedbackContent> for PreferenceContent {
-    fn from(content: feedback::FeedbackContent) -> Self {
-        match content {
-            feedback::FeedbackContent::Label { trial, label } => Self::Label { trial, label },
-            feedback::FeedbackContent::Preference { winner, loser } => Self::Preference { winner, loser },
-            feedback::FeedbackContent::NoDifference { a, b } => Self::NoDifference { a, b },
-            feedback::FeedbackContent::Suggestion { suggested, over } => Self::Suggestion { suggested, over },
+impl PreferenceContent {
+    /// `None` for the label of a trial and for a suggestion.
+    fn of(content: &feedback::FeedbackContent) -> Option<Self> {
+        match *content {
+            feedback::FeedbackContent::Preference { winner, loser } => Some(Self::Preference { winner, loser }),
+            feedback::FeedbackContent::NoDifference { a, b } => Some(Self::NoDifference { a, b }),
+            feedback::FeedbackContent::Label { .. } | feedback::FeedbackContent::Suggestion { .. } => None,
         }
     }
 }

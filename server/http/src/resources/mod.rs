@@ -34,6 +34,7 @@ pub(crate) mod solve_reports;
 pub(crate) mod stick_figures;
 pub(crate) mod studies;
 pub(crate) mod subjects;
+pub(crate) mod suggestions;
 pub(crate) mod tokens;
 pub(crate) mod trials;
 pub(crate) mod users;

@@ -21,9 +21,9 @@ pub(crate) struct ReferenceGait {
     created_at: Instant,
 }
 
-impl From<reference_gaits::ReferenceGait> for ReferenceGait {
-    fn from(row: reference_gaits::ReferenceGait) -> Self {
-        let reference_gaits::ReferenceGait { id, name, definition, created_at } = row;
+impl From<reference_gaits::ReferenceGaitRow> for ReferenceGait {
+    fn from(row: reference_gaits::ReferenceGaitRow) -> Self {
+        let reference_gaits::ReferenceGaitRow { id, name, definition, created_at } = row;
         Self { id, name, definition, created_at }
     }
 }

@@ -2,8 +2,9 @@
 
 use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
+use gaitwright_service::studies::simulated_walks_setting::SimulatedWalksSetting;
 use gaitwright_service::studies::study_plan_schemas;
-use gaitwright_store::studies::{self, AnswerSource, Evaluation, SimulatedWalks, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{self, AnswerSource, Evaluation, StudyState, WarmStartFrom};
 use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -114,8 +115,7 @@ pub(crate) struct StudyPlan {
     /// The gait from which trials are warm-started.
     warm_start_from: WarmStartFrom,
     /// Simulated walks with each gait.
-    #[schema(value_type = study_plan_schemas::SimulatedWalksSchema)]
-    simulated_walks: SimulatedWalks,
+    simulated_walks: SimulatedWalksSetting,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
     parallel_trials: u32,
     /// Priority, -10 to 10. Studies with a higher priority run first.
@@ -169,7 +169,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             unchanged_limit,
             repeat_results,
             warm_start_from,
-            simulated_walks,
+            simulated_walks: simulated_walks.into(),
             parallel_trials,
             priority,
             seed,

@@ -22,9 +22,9 @@ pub(crate) struct Subject {
     created_at: Instant,
 }
 
-impl From<subjects::Subject> for Subject {
-    fn from(row: subjects::Subject) -> Self {
-        let subjects::Subject { id, pseudonym, height_m, body_mass_kg, notes, created_at } = row;
+impl From<subjects::SubjectRow> for Subject {
+    fn from(row: subjects::SubjectRow) -> Self {
+        let subjects::SubjectRow { id, pseudonym, height_m, body_mass_kg, notes, created_at } = row;
         Self { id, pseudonym, height_m, body_mass_kg, notes, created_at }
     }
 }

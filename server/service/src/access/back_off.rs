@@ -35,7 +35,7 @@ const OTHER_NAMES: &str = "\n";
 
 /// Where a sign-in comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Origin {
+pub struct AttemptOrigin {
     /// The network of the client.
     pub network: String,
     /// The larger network that may belong to the same client, if any.
@@ -58,7 +58,7 @@ struct Count {
 pub struct PasswordAttempt {
     name: String,
     counts: Vec<Count>,
-    origin: Origin,
+    origin: AttemptOrigin,
     attempts: u32,
 }
 
@@ -71,7 +71,7 @@ pub async fn begin(
     writer: &mut Writer,
     now: Instant,
     name: &str,
-    origin: Origin,
+    origin: AttemptOrigin,
 ) -> Result<Result<PasswordAttempt, Duration>, Error> {
     prune(writer, now).await?;
     let name = normal(name);
@@ -137,7 +137,7 @@ impl PasswordAttempt {
 
 impl Count {
     /// The count of a network, or of a browser in which the user signed in earlier.
-    fn of_origin(name: &str, origin: &Origin) -> Self {
+    fn of_origin(name: &str, origin: &AttemptOrigin) -> Self {
         let source = match origin.known {
             Some(user) => format!("{} {user}", origin.network),
             None => origin.network.clone(),
@@ -171,7 +171,13 @@ fn normal(name: &str) -> String {
 
 /// Writes a row of the audit trail for the first attempts of a network, then for the 10th, 20th, 50th, 100th and so on,
 /// so that thousands of attempts do not fill the trail.
-async fn note(writer: &mut Writer, change: &str, name: &str, origin: &Origin, attempts: u32) -> Result<(), Error> {
+async fn note(
+    writer: &mut Writer,
+    change: &str,
+    name: &str,
+    origin: &AttemptOrigin,
+    attempts: u32,
+) -> Result<(), Error> {
     if !is_recorded(attempts) {
         return Ok(());
     }

@@ -2,9 +2,9 @@
 
 use crate::error::Error;
 use gait_optimizer as optimizer;
-use gaitwright_store::devices::Device;
-use gaitwright_store::reference_gaits::ReferenceGait;
-use gaitwright_store::subjects::Subject;
+use gaitwright_store::devices::DeviceRow;
+use gaitwright_store::reference_gaits::ReferenceGaitRow;
+use gaitwright_store::subjects::SubjectRow;
 use gaitwright_store::{Connection, devices, reference_gaits, subjects};
 
 /// Pseudonyms of the paper's subjects.
@@ -17,7 +17,7 @@ const PAPER: [(u32, &str, &str); 2] = [
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn device(db: &mut Connection) -> Result<Device, Error> {
+pub async fn device(db: &mut Connection) -> Result<DeviceRow, Error> {
     Ok(devices::ensure(db, &optimizer::Device::ampro3()?).await?.0)
 }
 
@@ -25,7 +25,7 @@ pub async fn device(db: &mut Connection) -> Result<Device, Error> {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGait, Error> {
+pub async fn reference_gait(db: &mut Connection) -> Result<ReferenceGaitRow, Error> {
     Ok(reference_gaits::ensure(db, &optimizer::ReferenceGait::builtin()?).await?.0)
 }
 
@@ -58,7 +58,7 @@ pub fn is_built_in(pseudonym: &str, body: optimizer::Subject, notes: &str) -> bo
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn subject_with(db: &mut Connection, body: optimizer::Subject) -> Result<Subject, Error> {
+pub async fn subject_with(db: &mut Connection, body: optimizer::Subject) -> Result<SubjectRow, Error> {
     let paper = PAPER.iter().find(|(number, ..)| optimizer::Subject::builtin(*number).is_ok_and(|known| known == body));
     let pseudonym = match paper {
         Some((_, name, _)) => (*name).to_owned(),

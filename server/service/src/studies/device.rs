@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::printable;
 use gait_optimizer::Device as Definition;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::devices::{self, Device};
+use gaitwright_store::devices::{self, DeviceRow};
 use gaitwright_store::{Connection, Writer};
 use serde_json::json;
 
@@ -34,7 +34,7 @@ pub async fn check_new(db: &mut Connection, definition: &Definition) -> Result<(
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
-pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(Device, bool), Error> {
+pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(DeviceRow, bool), Error> {
     check_new(writer, definition).await?;
     let (device, added) = devices::ensure(writer, definition).await?;
     if added {

@@ -26,15 +26,15 @@ pub const MOST_SIMULATED_WALKS: u32 = 1000;
 pub struct NewExecutionReport {
     /// Number of simulated walks on each kind of ground, 1 to 1000.
     #[schema(minimum = 1, maximum = 1000)]
-    pub simulated_walks: u32,
+    pub number_of_simulated_walks: u32,
     /// Seed of the disturbances. The same seed gives the same report.
     pub seed: u64,
 }
 
 impl Default for NewExecutionReport {
     fn default() -> Self {
-        let ExecutionOptions { simulated_walks, seed, .. } = ExecutionOptions::default();
-        Self { simulated_walks, seed }
+        let ExecutionOptions { number_of_simulated_walks, seed, .. } = ExecutionOptions::default();
+        Self { number_of_simulated_walks, seed }
     }
 }
 
@@ -44,14 +44,18 @@ impl NewExecutionReport {
     /// # Errors
     /// [`Error::Invalid`] naming the field.
     pub fn options(self) -> Result<ExecutionOptions, Error> {
-        let Self { simulated_walks, seed } = self;
-        if !(1..=MOST_SIMULATED_WALKS).contains(&simulated_walks) {
-            return Err(Error::invalid("simulated_walks", simulated_walks, &format!("1 to {MOST_SIMULATED_WALKS}")));
+        let Self { number_of_simulated_walks, seed } = self;
+        if !(1..=MOST_SIMULATED_WALKS).contains(&number_of_simulated_walks) {
+            return Err(Error::invalid(
+                "number_of_simulated_walks",
+                number_of_simulated_walks,
+                &format!("1 to {MOST_SIMULATED_WALKS}"),
+            ));
         }
         if seed > LARGEST_SEED {
             return Err(Error::invalid("seed", seed, &format!("0 to {LARGEST_SEED}")));
         }
-        Ok(ExecutionOptions { simulated_walks, seed, ..ExecutionOptions::default() })
+        Ok(ExecutionOptions { number_of_simulated_walks, seed, ..ExecutionOptions::default() })
     }
 }
 
@@ -69,7 +73,7 @@ pub enum Simulation {
         /// Number of simulated walks so far.
         done: u32,
         /// Number of simulated walks, over all grounds.
-        walks: u32,
+        of: u32,
     },
     /// Somebody cancelled it.
     Cancelled,
@@ -141,10 +145,11 @@ pub(super) async fn write(
     asked: NewExecutionReport,
     report: ExecutionReport,
 ) -> StoreResult<()> {
-    let (id, NewExecutionReport { simulated_walks, seed }) = (trial.id, asked);
+    let (id, NewExecutionReport { number_of_simulated_walks, seed }) = (trial.id, asked);
     let actor = Actor::program();
     let program = actor.as_str().to_owned();
-    let reported = ExecutionReported { trial_id: id, number: trial.number, simulated_walks, seed, program, report };
+    let reported =
+        ExecutionReported { trial_id: id, number: trial.number, number_of_simulated_walks, seed, program, report };
     events::append(writer, trial.study_id, execution_reports::REPORTED, &reported).await?;
     audit::append(writer, &actor, execution_reports::STORED, &format!("trial {id}"), &json!(asked)).await
 }

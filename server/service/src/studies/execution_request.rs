@@ -22,16 +22,17 @@ pub async fn ask(
 ) -> Result<(), Error> {
     asked.options()?;
     let open = scheduler.simulating(id).open();
-    if let Some(NewExecutionReport { simulated_walks, seed }) = open.filter(|open| *open != asked) {
+    if let Some(NewExecutionReport { number_of_simulated_walks, seed }) = open.filter(|open| *open != asked) {
         return Err(Error::conflict(format!(
-            "An execution report for this gait (number of simulated walks: {simulated_walks}, seed: {seed}) is already queued or running. Wait for it, or cancel the job execution_report-{id}."
+            "An execution report for this gait (number of simulated walks: {number_of_simulated_walks}, seed: {seed}) is already queued or running. Wait for it, or cancel the job execution_report-{id}."
         )));
     }
     let study = trials::get(writer, id).await?.study_id;
     consents::may_be_shown(writer, study).await?;
     let newest = newest(writer, id).await?.map(|StoredReport { reported, .. }| reported);
-    let exists =
-        newest.is_some_and(|newest| (newest.simulated_walks, newest.seed) == (asked.simulated_walks, asked.seed));
+    let exists = newest.is_some_and(|newest| {
+        (newest.number_of_simulated_walks, newest.seed) == (asked.number_of_simulated_walks, asked.seed)
+    });
     if !exists {
         gait_of(writer, id).await?;
         if open.is_none() {

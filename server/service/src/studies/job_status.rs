@@ -101,7 +101,7 @@ async fn execution_report(db: &mut Connection, scheduler: &Scheduler, trial: Tri
 fn progress(scheduler: &Scheduler, id: JobId) -> Option<f64> {
     let JobId::ExecutionReport(trial) = id else { return None };
     match scheduler.simulating(trial) {
-        Simulation::Running { done, walks, .. } => Some(f64::from(done) / f64::from(walks.max(1))),
+        Simulation::Running { done, of, .. } => Some(f64::from(done) / f64::from(of.max(1))),
         _ => None,
     }
 }

@@ -69,6 +69,7 @@ pub mod scheduler;
 pub mod seed;
 pub mod sensitivities;
 mod simulated_walks;
+pub mod simulated_walks_setting;
 pub mod snapshot;
 mod stopping_rule;
 pub mod study_change;

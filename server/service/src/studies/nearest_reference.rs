@@ -3,7 +3,7 @@
 use crate::error::Error;
 use gait_optimizer::Subject;
 use gait_optimizer::reference::distance;
-use gaitwright_store::reference_gaits::{self, ReferenceGait};
+use gaitwright_store::reference_gaits::{self, ReferenceGaitRow};
 use gaitwright_store::{Connection, ReferenceGaitId};
 use std::cmp::Reverse;
 
@@ -11,7 +11,7 @@ use std::cmp::Reverse;
 #[derive(Debug, Clone)]
 pub struct ReferenceGaitMatch {
     /// The reference gait.
-    pub reference_gait: ReferenceGait,
+    pub reference_gait: ReferenceGaitRow,
     /// `sqrt((dh / 0.10 m)^2 + (dm / 15 kg)^2)`. Absent if the reference gait does not state height and mass.
     pub distance: Option<f64>,
 }

@@ -159,24 +159,35 @@ pub async fn retract(
         studies::get(writer, study).await?;
     }
     let row = feedback::get(writer, id).await?;
-    if study.is_some_and(|study| study != row.study_id) {
+    let is_preference =
+        matches!(row.content, FeedbackContent::Preference { .. } | FeedbackContent::NoDifference { .. });
+    if !is_preference || study.is_some_and(|study| study != row.study_id) {
         return Err(Error::NotFound { what: "preference".to_owned(), id: id.to_string() });
     }
+    retract_entry(writer, caller, ("preference", &row), author, reason).await
+}
+
+/// Retracts an entry of the learner's log, named by its kind in the audit trail.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the field, [`Error::Conflict`] if it was retracted or the subject withdrew consent.
+pub(super) async fn retract_entry(
+    writer: &mut Writer,
+    caller: &Caller,
+    (kind, row): (&str, &FeedbackRow),
+    author: Option<&str>,
+    reason: &str,
+) -> Result<FeedbackRow, Error> {
     consents::may_be_shown(writer, row.study_id).await?;
-    if matches!(row.content, FeedbackContent::Label { .. }) {
-        return Err(Error::conflict(
-            "This entry is the label of a trial. Only answers and suggestions can be retracted.",
-        ));
-    }
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
-    let reason = printable::reason("reason", reason, " and say why the answer is retracted")?;
-    if !feedback::retract(writer, &row, author, reason).await? {
-        return Err(Error::conflict("This preference was already retracted."));
+    let reason = printable::reason("reason", reason, &format!(" and say why the {kind} is retracted"))?;
+    if !feedback::retract(writer, row, author, reason).await? {
+        return Err(Error::conflict(&format!("This {kind} was already retracted.")));
     }
-    events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": id })).await?;
+    events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": row.id })).await?;
     let detail = json!({ "study": row.study_id, "author": author, "reason": reason });
-    audit::append(writer, &caller.actor, "preference.retract", &format!("preference {id}"), &detail).await?;
-    Ok(feedback::get(writer, id).await?)
+    audit::append(writer, &caller.actor, &format!("{kind}.retract"), &format!("{kind} {}", row.id), &detail).await?;
+    Ok(feedback::get(writer, row.id).await?)
 }
 
 /// The converged trial that `field` names.

@@ -28,7 +28,9 @@ impl RecordedAnswer {
     /// [`Error::NotFound`], even for an answer of another study than `study`.
     pub async fn get(db: &mut Connection, study: Option<StudyId>, id: AnswerId) -> Result<Self, Error> {
         let found = match feedback::find(db, id.of_preference()).await? {
-            Some(row) => Some(Self::Preference(row)),
+            Some(row) => {
+                Some(row).filter(|row| !matches!(row.content, FeedbackContent::Suggestion { .. })).map(Self::Preference)
+            }
             None => assessments::find(db, id.of_assessment()).await?.map(Self::Assessment),
         };
         found

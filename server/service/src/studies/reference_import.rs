@@ -5,7 +5,7 @@ use crate::printable;
 use gait_optimizer::ReferenceGait as Definition;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, MeasuredPerson, MotionRecording};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::reference_gaits::{self, ReferenceGait};
+use gaitwright_store::reference_gaits::{self, ReferenceGaitRow};
 use gaitwright_store::{Store, Writer};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -213,7 +213,11 @@ pub(super) fn check(definition: &Definition) -> Result<(), Error> {
 ///
 /// # Errors
 /// [`Error::Invalid`] for a name that does not print; errors of the database.
-pub async fn add(writer: &mut Writer, actor: &Actor, definition: &Definition) -> Result<(ReferenceGait, bool), Error> {
+pub async fn add(
+    writer: &mut Writer,
+    actor: &Actor,
+    definition: &Definition,
+) -> Result<(ReferenceGaitRow, bool), Error> {
     writer.check_free_space()?;
     check(definition)?;
     let (reference, added) = reference_gaits::ensure(writer, definition).await?;

@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 /// [`Error::Conflict`] if the subject withdrew consent; a malformed gait; errors of the database.
 pub async fn carry_out(store: &mut Store, study: StudyId, threads: usize, begins: impl Fn(u32)) -> Result<(), Error> {
     let requested = execution_reports::requested(&mut *store.read().await?).await?;
-    for (id, simulated_walks, seed) in requested {
+    for (id, number_of_simulated_walks, seed) in requested {
         let mut reader = store.read().await?;
         let trial = trials::get(&mut reader, id).await?;
         if trial.study_id != study {
@@ -25,7 +25,7 @@ pub async fn carry_out(store: &mut Store, study: StudyId, threads: usize, begins
         let gait = execution::gait_of(&mut reader, id).await?;
         drop(reader);
         begins(trial.number);
-        let asked = NewExecutionReport { simulated_walks, seed };
+        let asked = NewExecutionReport { number_of_simulated_walks, seed };
         let options = ExecutionOptions { threads, ..asked.options()? };
         let gait = store.compute(move |pool| gait.unpack(pool)).await??;
         let work = move |cancel: &_| simulate(&gait, &options, &AtomicU32::new(0), cancel);

@@ -12,9 +12,11 @@ use serde_json::json;
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check(plan: &StudyPlan) -> Result<(), Error> {
-    let SimulatedWalks { effect, number, gait_rmse_tolerance_rad, least_mean_strides } = plan.simulated_walks;
-    if !(1..=MOST_SIMULATED_WALKS).contains(&number) {
-        return Err(Error::invalid("simulated_walks.number", number, &format!("1 to {MOST_SIMULATED_WALKS}")));
+    let SimulatedWalks { effect, number_of_simulated_walks, gait_rmse_tolerance_rad, least_mean_strides } =
+        plan.simulated_walks;
+    if !(1..=MOST_SIMULATED_WALKS).contains(&number_of_simulated_walks) {
+        let field = "simulated_walks.number_of_simulated_walks";
+        return Err(Error::invalid(field, number_of_simulated_walks, &format!("1 to {MOST_SIMULATED_WALKS}")));
     }
     if !(0.0..=10.0).contains(&gait_rmse_tolerance_rad) {
         let field = "simulated_walks.gait_rmse_tolerance_rad";
@@ -39,7 +41,7 @@ pub(super) fn check(plan: &StudyPlan) -> Result<(), Error> {
 /// The execution report that a study makes of each gait. All of them have the seed of the study, so that the gaits meet
 /// the same disturbances.
 pub(super) fn report_of_each_gait(plan: &StudyPlan) -> NewExecutionReport {
-    NewExecutionReport { simulated_walks: plan.simulated_walks.number, seed: plan.seed }
+    NewExecutionReport { number_of_simulated_walks: plan.simulated_walks.number_of_simulated_walks, seed: plan.seed }
 }
 
 /// The label of a converged gait.

@@ -2,6 +2,7 @@
 
 use super::bound_grid::{self, RequestedSearchSpace};
 use super::seed::LARGEST_SEED;
+use super::simulated_walks_setting::SimulatedWalksSetting;
 use super::subject::{self, NewSubject};
 use super::{built_in_entries, membership, simulated_walks, study_name, study_plan_schemas};
 use crate::access::{Caller, Reach};
@@ -10,9 +11,7 @@ use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{
-    AnswerSource, Evaluation, SimulatedWalks, Study, StudyPlan, StudyState, WarmStartFrom,
-};
+use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -87,8 +86,7 @@ pub struct NewStudy {
     pub warm_start_from: WarmStartFrom,
     /// Simulated walks with each gait. By default, the service simulates none.
     #[serde(default)]
-    #[schema(value_type = study_plan_schemas::SimulatedWalksSchema)]
-    pub simulated_walks: SimulatedWalks,
+    pub simulated_walks: SimulatedWalksSetting,
     /// Number of trials that run in parallel.
     #[serde(default = "one")]
     pub parallel_trials: u32,
@@ -149,7 +147,7 @@ impl NewStudy {
             unchanged_limit: None,
             repeat_results: None,
             warm_start_from: incumbent(),
-            simulated_walks: SimulatedWalks::default(),
+            simulated_walks: SimulatedWalksSetting::default(),
             parallel_trials: one(),
             priority: 0,
             seed: one_seed(),
@@ -180,7 +178,7 @@ impl NewStudy {
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
             warm_start_from: plan.warm_start_from,
-            simulated_walks: plan.simulated_walks,
+            simulated_walks: plan.simulated_walks.into(),
             parallel_trials: plan.parallel_trials,
             priority: plan.priority,
             seed: plan.seed,
@@ -318,7 +316,7 @@ async fn check_for(
         unchanged_limit: new.unchanged_limit,
         repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
         warm_start_from: new.warm_start_from,
-        simulated_walks: new.simulated_walks,
+        simulated_walks: new.simulated_walks.into(),
         parallel_trials: new.parallel_trials,
         priority: new.priority,
         seed: new.seed,

@@ -5,7 +5,7 @@ use crate::printable;
 use gait_optimizer::Subject as Body;
 use gait_optimizer::muscle::MuscleParameters;
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::subjects::{self, Correction, PSEUDONYM_UNIQUE, Subject};
+use gaitwright_store::subjects::{self, Correction, PSEUDONYM_UNIQUE, SubjectRow};
 use gaitwright_store::{Connection, OnConstraint, SubjectId, Writer};
 use serde::Deserialize;
 use serde_json::json;
@@ -45,7 +45,7 @@ pub(super) fn check(pseudonym: &str, height_m: f64, body_mass_kg: f64, notes: &s
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] if the pseudonym is taken.
-pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<Subject, Error> {
+pub async fn add(writer: &mut Writer, actor: &Actor, new: &NewSubject) -> Result<SubjectRow, Error> {
     let pseudonym = new.pseudonym.trim();
     let body = checked(writer, new).await?;
     let subject = subjects::insert(writer, pseudonym, body, &new.notes)

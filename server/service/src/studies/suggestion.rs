@@ -2,10 +2,11 @@
 
 use super::answer_giver::AnswerGiver;
 use super::feedback_log;
-use super::preference_answer::{attribution, comparable};
+use super::preference_answer::{attribution, comparable, retract_entry};
 use crate::access::Caller;
 use crate::error::Error;
 use gait_learner::ActionIndex;
+use gaitwright_store::feedback::{self, FeedbackContent, FeedbackRow};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{FeedbackId, StudyId, TrialId, Writer, audit, events, studies};
@@ -17,7 +18,7 @@ use utoipa::ToSchema;
 /// Bounds with which a gait would have been better than that of a trial.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Suggestion {
+pub struct NewSuggestion {
     /// Trial whose gait could be better.
     pub over: TrialId,
     /// Suggested values of tuned bounds, such as `{"a5": 0.026}`. Each must be a value of the search space. Other
@@ -41,7 +42,12 @@ pub struct Suggestion {
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field, [`Error::Conflict`] for a second answer of the same person.
-pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Suggestion) -> Result<FeedbackId, Error> {
+pub async fn give(
+    writer: &mut Writer,
+    caller: &Caller,
+    study: StudyId,
+    new: &NewSuggestion,
+) -> Result<FeedbackId, Error> {
     let study = studies::get(writer, study).await?;
     let trial = comparable(writer, study.id, "over", new.over).await?;
     let suggested = action(&study, &trial, &new.bounds)?;
@@ -49,8 +55,27 @@ pub async fn give(writer: &mut Writer, caller: &Caller, study: StudyId, new: &Su
     let id = feedback_log::suggest(writer, &trial, (suggested, &json!(new.bounds)), attribution).await?;
     events::append(writer, study.id, "feedback_given", &json!({ "feedback_id": id })).await?;
     let detail = json!({ "study": study.id, "over": trial.id, "bounds": new.bounds, "author": attribution.author });
-    audit::append(writer, &caller.actor, "suggestion.give", &format!("preference {id}"), &detail).await?;
+    audit::append(writer, &caller.actor, "suggestion.give", &format!("suggestion {id}"), &detail).await?;
     Ok(id)
+}
+
+/// Retracts a suggestion.
+///
+/// # Errors
+/// [`Error::NotFound`] for an entry that is no suggestion; [`Error::Invalid`] naming the field; [`Error::Conflict`] if it was
+/// retracted or the subject withdrew consent.
+pub async fn retract(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: FeedbackId,
+    author: Option<&str>,
+    reason: &str,
+) -> Result<FeedbackRow, Error> {
+    let row = feedback::get(writer, id).await?;
+    if !matches!(row.content, FeedbackContent::Suggestion { .. }) {
+        return Err(Error::NotFound { what: "suggestion".to_owned(), id: id.to_string() });
+    }
+    retract_entry(writer, caller, ("suggestion", &row), author, reason).await
 }
 
 /// The action of the trial with the suggested bounds.

@@ -43,7 +43,7 @@ pub struct Summary {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SimulatedWalksSummary {
     /// Number of simulated walks.
-    pub simulated_walks: u32,
+    pub number_of_simulated_walks: u32,
     /// Number of complete ones.
     pub completed: u32,
     /// Mean number of strides.
@@ -54,8 +54,8 @@ pub struct SimulatedWalksSummary {
 
 impl SimulatedWalksSummary {
     fn of(report: &ExecutionReport) -> Self {
-        let (completed, simulated_walks) = report.completed_of_all();
-        Self { simulated_walks, completed, mean_strides: report.mean_strides(), seed: report.seed }
+        let (completed, number_of_simulated_walks) = report.completed_of_all();
+        Self { number_of_simulated_walks, completed, mean_strides: report.mean_strides(), seed: report.seed }
     }
 }
 

@@ -45,7 +45,9 @@ impl TrialJob for WalkSimulator {
         let requested = execution_reports::requested(&mut *self.store.read().await?).await?;
         Ok(requested
             .into_iter()
-            .map(|(trial, simulated_walks, seed)| (trial, NewExecutionReport { simulated_walks, seed }.into()))
+            .map(|(trial, number_of_simulated_walks, seed)| {
+                (trial, NewExecutionReport { number_of_simulated_walks, seed }.into())
+            })
             .collect())
     }
 
@@ -80,7 +82,7 @@ pub(super) fn simulation(state: TrialJobState<Request>) -> Simulation {
         TrialJobState::Running { request: Request { asked, done }, .. } => Simulation::Running {
             asked,
             done: done.load(Ordering::Relaxed),
-            walks: asked.options().map_or(0, |options| options.random_walks()),
+            of: asked.options().map_or(0, |options| options.random_walks()),
         },
         TrialJobState::Cancelled => Simulation::Cancelled,
         TrialJobState::Failed(reason) => Simulation::Failed(reason),

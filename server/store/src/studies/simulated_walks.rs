@@ -48,7 +48,7 @@ pub struct SimulatedWalks {
     /// Effect of the simulated walks on the study.
     pub effect: SimulatedWalksEffect,
     /// Number of simulated walks on each of the three kinds of ground, 1 to 1000.
-    pub number: u32,
+    pub number_of_simulated_walks: u32,
     /// `tie_break`: difference in Gait RMSE, rad, below which two gaits are compared by their mean strides. 0 to 10.
     pub gait_rmse_tolerance_rad: f64,
     /// `label`: minimum mean strides of an executable gait. A complete simulated walk has 20 strides. 0 to 20.
@@ -57,6 +57,11 @@ pub struct SimulatedWalks {
 
 impl Default for SimulatedWalks {
     fn default() -> Self {
-        Self { effect: SimulatedWalksEffect::None, number: 50, gait_rmse_tolerance_rad: 0.05, least_mean_strides: 3.0 }
+        Self {
+            effect: SimulatedWalksEffect::None,
+            number_of_simulated_walks: 50,
+            gait_rmse_tolerance_rad: 0.05,
+            least_mean_strides: 3.0,
+        }
     }
 }

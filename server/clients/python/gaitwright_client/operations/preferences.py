@@ -19,6 +19,7 @@ from ..schemas import (
     NewPreference,
     NewSafetyReport,
     NewSafetyReview,
+    NewSuggestion,
     Preference,
     RestoredAnswer,
     SafetyReport,
@@ -220,7 +221,7 @@ class PreferencesMethods(Transport):
         """
         return Pages(self, "/api/v1/studies/{id}/safety-reports", {"id": study_id}, query={"limit": page_size})
 
-    def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Preference]:
+    def list_suggestions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Suggestion]:
         """List suggestions of a study.
 
         Includes retracted suggestions. Oldest first.
@@ -232,20 +233,48 @@ class PreferencesMethods(Transport):
         study_id: StudyId,
         *,
         idempotency_key: Optional[str] = None,
-        **body: Unpack[Suggestion],
-    ) -> Preference:
+        **body: Unpack[NewSuggestion],
+    ) -> Suggestion:
         """Create a suggestion.
 
-        The learner uses it like a preference. Retract it with `POST /api/v1/preferences/{id}/retract`.
+        The learner uses it like a preference.
 
         Fields: bounds, over; optionally author, note, source.
         """
         return cast(
-            Preference,
+            Suggestion,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/suggestions",
                 {"id": study_id},
+                body=body,
+                key=idempotency_key,
+            ),
+        )
+
+    def get_suggestion(self, suggestion_id: FeedbackId) -> Suggestion:
+        """Get a suggestion."""
+        return cast(Suggestion, self.request_json("GET", "/api/v1/suggestions/{id}", {"id": suggestion_id}))
+
+    def retract_suggestion(
+        self,
+        suggestion_id: FeedbackId,
+        *,
+        idempotency_key: Optional[str] = None,
+        **body: Unpack[AnswerRetraction],
+    ) -> Suggestion:
+        """Retract a suggestion.
+
+        The suggestion stays on record, but the learner no longer uses it.
+
+        Fields: reason; optionally author.
+        """
+        return cast(
+            Suggestion,
+            self.request_json(
+                "POST",
+                "/api/v1/suggestions/{id}/retract",
+                {"id": suggestion_id},
                 body=body,
                 key=idempotency_key,
             ),

@@ -159,7 +159,7 @@ class TrialsMethods(Transport):
         The gait of the trial must have converged. Walks on level ground, and on ground uneven by ±5 mm and by ±10 mm,
         are simulated. The same number of simulated walks and seed give the same report.
 
-        Fields: optionally seed, simulated_walks.
+        Fields: optionally number_of_simulated_walks, seed.
         """
         return cast(
             Job,

@@ -32,8 +32,8 @@ impl NewStudyFields {
             seed: plan.seed.to_string(),
             repeat_results: ticked(plan.repeat_results),
             warm_start_from_root: ticked(plan.warm_start_from == WarmStartFrom::Root),
-            walks_effect: plan.simulated_walks.effect.as_str().to_owned(),
-            walks_number: plan.simulated_walks.number.to_string(),
+            simulated_walks_effect: plan.simulated_walks.effect.as_str().to_owned(),
+            number_of_simulated_walks: plan.simulated_walks.number_of_simulated_walks.to_string(),
             gait_rmse_tolerance_rad: plan.simulated_walks.gait_rmse_tolerance_rad.to_string(),
             least_mean_strides: plan.simulated_walks.least_mean_strides.to_string(),
             nearest_within_percent: match plan.solve_options.local_optimum_choice {

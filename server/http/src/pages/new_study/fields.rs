@@ -1,7 +1,7 @@
 //! The fields of the form for a new study: their defaults, those of a clone, and their labels.
 
 use super::super::subjects::unused_pseudonym;
-use crate::refused_fields::{TypedForm, labels_of};
+use crate::refused_fields::{FieldLabels, TypedForm};
 use crate::units::Units;
 use gait_learner::{LearnerSettings, Method};
 use gait_optimizer::TunedBounds;
@@ -51,10 +51,10 @@ pub(crate) struct NewStudyFields {
     /// Present when ticked.
     #[serde(default)]
     pub(super) warm_start_from_root: Option<String>,
-    #[serde(rename = "simulated_walks.effect", default = "no_walks")]
-    pub(super) walks_effect: String,
-    #[serde(rename = "simulated_walks.number", default)]
-    pub(super) walks_number: String,
+    #[serde(rename = "simulated_walks.effect", default = "no_simulated_walks")]
+    pub(super) simulated_walks_effect: String,
+    #[serde(rename = "simulated_walks.number_of_simulated_walks", default)]
+    pub(super) number_of_simulated_walks: String,
     #[serde(rename = "simulated_walks.gait_rmse_tolerance_rad", default)]
     pub(super) gait_rmse_tolerance_rad: String,
     #[serde(rename = "simulated_walks.least_mean_strides", default)]
@@ -73,7 +73,7 @@ pub(crate) struct NewStudyFields {
     pub(super) space: BTreeMap<String, String>,
 }
 
-fn no_walks() -> String {
+fn no_simulated_walks() -> String {
     SimulatedWalksEffect::None.as_str().to_owned()
 }
 
@@ -104,8 +104,8 @@ impl Default for NewStudyFields {
             seed: text("1"),
             repeat_results: None,
             warm_start_from_root: None,
-            walks_effect: no_walks(),
-            walks_number: String::new(),
+            simulated_walks_effect: no_simulated_walks(),
+            number_of_simulated_walks: String::new(),
             gait_rmse_tolerance_rad: String::new(),
             least_mean_strides: String::new(),
             nearest_within_percent: String::new(),
@@ -129,16 +129,35 @@ impl NewStudyFields {
 }
 
 impl TypedForm for NewStudyFields {
+    const LABELS: FieldLabels = &[
+        ("subject", "Subject"),
+        ("pseudonym", "Pseudonym"),
+        ("height_m", "Height"),
+        ("body_mass_kg", "Body mass"),
+        ("device", "Device"),
+        ("reference_gait", "Reference gait"),
+        ("muscles", "Variant"),
+        ("answer_source", "Source of answers"),
+        ("number_of_trials", "Number of trials"),
+        ("name", "Name"),
+        ("learner", "Learner"),
+        ("unchanged_limit", "Stop early after"),
+        ("parallel_trials", "Parallel trials"),
+        ("seed", "Seed"),
+        ("simulated_walks.effect", "Simulated walks"),
+        ("simulated_walks.number_of_simulated_walks", "Number of simulated walks on each kind of ground"),
+        ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
+        ("simulated_walks.least_mean_strides", "Minimum mean strides"),
+        ("initial_guesses", "Initial guesses"),
+        ("nearest_within_percent", "Objective tolerance, %"),
+        ("local_optimum", "Local optimum"),
+    ];
+
+    /// The table of bounds is before the source of answers.
     fn labels(&self) -> Vec<(String, String)> {
-        let mut labels = labels_of(&[
-            ("subject", "Subject"),
-            ("pseudonym", "Pseudonym"),
-            ("height_m", "Height, m"),
-            ("body_mass_kg", "Body mass, kg"),
-            ("device", "Device"),
-            ("reference_gait", "Reference gait"),
-            ("muscles", "Variant"),
-        ]);
+        let mut labels = self.units.with_headings(Self::LABELS);
+        let after =
+            labels.split_off(labels.iter().position(|(name, _)| name == "answer_source").unwrap_or(labels.len()));
         for bound in TunedBounds::NAMES {
             labels.push((bound.to_owned(), bound.to_owned()));
             for (part, label) in
@@ -147,22 +166,7 @@ impl TypedForm for NewStudyFields {
                 labels.push((format!("{part}_{bound}"), format!("{label} of {bound}")));
             }
         }
-        labels.extend(labels_of(&[
-            ("answer_source", "Source of answers"),
-            ("number_of_trials", "Number of trials"),
-            ("name", "Name"),
-            ("learner", "Learner"),
-            ("unchanged_limit", "Stop early after"),
-            ("parallel_trials", "Parallel trials"),
-            ("seed", "Seed"),
-            ("simulated_walks.effect", "Simulated walks"),
-            ("simulated_walks.number", "Number of simulated walks on each kind of ground"),
-            ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
-            ("simulated_walks.least_mean_strides", "Minimum mean strides"),
-            ("initial_guesses", "Initial guesses"),
-            ("nearest_within_percent", "Objective tolerance, %"),
-            ("local_optimum", "Local optimum"),
-        ]));
+        labels.extend(after);
         labels
     }
 
@@ -198,8 +202,8 @@ impl TypedForm for NewStudyFields {
             "unchanged_limit" => self.unchanged_limit.clear(),
             "parallel_trials" => self.parallel_trials = default.parallel_trials,
             "seed" => self.seed = default.seed,
-            "simulated_walks.effect" => self.walks_effect = default.walks_effect,
-            "simulated_walks.number" => self.walks_number.clear(),
+            "simulated_walks.effect" => self.simulated_walks_effect = default.simulated_walks_effect,
+            "simulated_walks.number_of_simulated_walks" => self.number_of_simulated_walks.clear(),
             "simulated_walks.gait_rmse_tolerance_rad" => self.gait_rmse_tolerance_rad.clear(),
             "simulated_walks.least_mean_strides" => self.least_mean_strides.clear(),
             "nearest_within_percent" => self.nearest_within_percent.clear(),
@@ -245,7 +249,7 @@ pub(super) fn learner(name: &str) -> Option<LearnerSettings> {
 }
 
 /// What simulated walks can do: effect, label and explanation.
-pub(super) const WALKS_EFFECTS: [(SimulatedWalksEffect, &str, &str); 4] = [
+pub(super) const SIMULATED_WALKS_EFFECTS: [(SimulatedWalksEffect, &str, &str); 4] = [
     (SimulatedWalksEffect::None, "Nothing", "walks are simulated only on request, on the page of a gait"),
     (SimulatedWalksEffect::Report, "Report", "each gait gets an execution report; trials are not affected"),
     (

@@ -8,7 +8,7 @@ mod tuned_and_fixed_bounds;
 
 use self::chosen_reference::ReferenceChoice;
 use self::clone::cloned;
-use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, WALKS_EFFECTS};
+use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, SIMULATED_WALKS_EFFECTS};
 use self::planning::{faults, make};
 use self::tuned_and_fixed_bounds::SpaceEditor;
 use crate::AppState;
@@ -17,7 +17,7 @@ use crate::authorization::Authorized;
 use crate::extractors::{Form, Params};
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
-use crate::refused_fields::{FormCheck, RefusedFields};
+use crate::refused_fields::{FormCheck, RefusedFields, TypedForm};
 use crate::units::Units;
 use askama::Template;
 use axum::Json;
@@ -28,10 +28,10 @@ use gait_optimizer::TunedBounds;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::sample_study;
-use gaitwright_store::devices::Device;
-use gaitwright_store::reference_gaits::ReferenceGait;
+use gaitwright_store::devices::DeviceRow;
+use gaitwright_store::reference_gaits::ReferenceGaitRow;
 use gaitwright_store::studies::{self, SimulatedWalks, SimulatedWalksEffect, Study, StudyPlan};
-use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::subjects::{self, SubjectRow};
 use gaitwright_store::{
     Connection, StoreError, StudyId, SubjectId, commit, consents, devices, members, reference_gaits, trials,
 };
@@ -39,9 +39,9 @@ use serde::{Deserialize, Serialize};
 
 /// The choices of the form, and measured solve times.
 struct FormChoices {
-    subjects: Vec<Subject>,
-    devices: Vec<Device>,
-    references: Vec<ReferenceGait>,
+    subjects: Vec<SubjectRow>,
+    devices: Vec<DeviceRow>,
+    references: Vec<ReferenceGaitRow>,
     measured: [Option<trials::SolveTimes>; 2],
 }
 
@@ -66,7 +66,7 @@ struct NewStudyPage {
     units: Units,
     offered: FormChoices,
     learners: &'static [(&'static str, &'static str, &'static str)],
-    walks_effects: &'static [(SimulatedWalksEffect, &'static str, &'static str)],
+    simulated_walks_effects: &'static [(SimulatedWalksEffect, &'static str, &'static str)],
     /// The defaults of simulated walks.
     walks: SimulatedWalks,
     fields: NewStudyFields,
@@ -82,7 +82,7 @@ struct NewStudyPage {
 }
 
 impl NewStudyPage {
-    fn selected(&self, subject: &Subject) -> bool {
+    fn selected(&self, subject: &SubjectRow) -> bool {
         self.fields.subject == subject.id.to_string()
             || (self.fields.subject.is_empty() && subject.pseudonym == "paper-1")
     }
@@ -118,8 +118,8 @@ impl NewStudyPage {
                 unchanged_limit,
                 parallel_trials,
                 seed,
-                walks_effect,
-                walks_number,
+                simulated_walks_effect,
+                number_of_simulated_walks,
                 gait_rmse_tolerance_rad,
                 least_mean_strides,
                 nearest_within_percent,
@@ -127,7 +127,8 @@ impl NewStudyPage {
                 local_optimum,
                 ..
             } = fields.clone();
-            let walks = [walks_effect, walks_number, gait_rmse_tolerance_rad, least_mean_strides];
+            let walks =
+                [simulated_walks_effect, number_of_simulated_walks, gait_rmse_tolerance_rad, least_mean_strides];
             let cold_starts = [nearest_within_percent, initial_guesses, local_optimum];
             ([learner, unchanged_limit, parallel_trials, seed], cold_starts, walks)
         };
@@ -214,12 +215,12 @@ async fn show(
     let not_offered = not_offered(&mut reader, &offered.subjects, &fields.subject).await?;
     drop(reader);
     let editor = SpaceEditor::typed(&fields.space)?;
-    let (walks_effects, walks) = (&WALKS_EFFECTS, SimulatedWalks::default());
+    let (simulated_walks_effects, walks) = (&SIMULATED_WALKS_EFFECTS, SimulatedWalks::default());
     page(&NewStudyPage {
         units,
         offered,
         learners: &LEARNERS,
-        walks_effects,
+        simulated_walks_effects,
         walks,
         fields,
         editor,
@@ -231,7 +232,7 @@ async fn show(
 }
 
 /// Why the chosen subject cannot have a new study. Empty if it can, and if none is chosen.
-async fn not_offered(db: &mut Connection, offered: &[Subject], chosen: &str) -> Result<String, Error> {
+async fn not_offered(db: &mut Connection, offered: &[SubjectRow], chosen: &str) -> Result<String, Error> {
     let Ok(id) = chosen.parse::<SubjectId>() else { return Ok(String::new()) };
     if offered.iter().any(|subject| subject.id == id) {
         return Ok(String::new());

@@ -8,9 +8,10 @@ use gait_optimizer::{InitialGuess, LocalOptimumChoice, SolveOptions};
 use gaitwright_service::access::{Caller, Reach};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::seed;
+use gaitwright_service::studies::simulated_walks_setting::SimulatedWalksSetting;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
-use gaitwright_store::studies::{AnswerSource, SimulatedWalks, SimulatedWalksEffect, Study, StudyPlan, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, SimulatedWalksEffect, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::ops::ControlFlow;
 use std::str::FromStr;
@@ -142,18 +143,22 @@ fn study_of(
 }
 
 /// Empty numbers have their defaults.
-fn simulated_walks(fields: &NewStudyFields) -> Result<SimulatedWalks, Error> {
-    let default = SimulatedWalks::default();
-    let effect = SimulatedWalksEffect::ALL.into_iter().find(|effect| effect.as_str() == fields.walks_effect);
+fn simulated_walks(fields: &NewStudyFields) -> Result<SimulatedWalksSetting, Error> {
+    let default = SimulatedWalksSetting::default();
+    let effect = SimulatedWalksEffect::ALL.into_iter().find(|effect| effect.as_str() == fields.simulated_walks_effect);
     let names = SimulatedWalksEffect::ALL.map(SimulatedWalksEffect::as_str).join(", ");
     let strides = "simulated_walks.least_mean_strides";
     let tolerance = "simulated_walks.gait_rmse_tolerance_rad";
-    Ok(SimulatedWalks {
+    Ok(SimulatedWalksSetting {
         effect: effect.ok_or_else(|| {
-            Error::invalid("simulated_walks.effect", fields.walks_effect.as_str(), &format!("one of {names}"))
+            Error::invalid("simulated_walks.effect", fields.simulated_walks_effect.as_str(), &format!("one of {names}"))
         })?,
-        number: optional("simulated_walks.number", &fields.walks_number, "1 to 1000, or empty")?
-            .unwrap_or(default.number),
+        number_of_simulated_walks: optional(
+            "simulated_walks.number_of_simulated_walks",
+            &fields.number_of_simulated_walks,
+            "1 to 1000, or empty",
+        )?
+        .unwrap_or(default.number_of_simulated_walks),
         gait_rmse_tolerance_rad: optional(tolerance, &fields.gait_rmse_tolerance_rad, "0 to 10, or empty")?
             .unwrap_or(default.gait_rmse_tolerance_rad),
         least_mean_strides: optional(strides, &fields.least_mean_strides, "0 to 20, or empty")?

@@ -3,7 +3,7 @@
 use super::answers_table::{AnswerRow, answers};
 use super::best_gait::{BestFindings, BestGait};
 use super::recommended_walker::RecommendedGait;
-use super::state_buttons::{TransitionButton, button};
+use super::state_buttons::{TransitionButton, TransitionForm, button};
 use super::time_left::time_left;
 use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use super::without_gait::TrialsWithoutGait;
@@ -13,6 +13,7 @@ use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
 use crate::format;
 use crate::pages::certainty::certainty;
 use crate::pages::page_chart::PageChart;
+use crate::refused_fields::{RefusedFields, TypedForm};
 use askama::Template;
 use gait_learner::LearnerError;
 use gaitwright_charts::Figure;
@@ -44,6 +45,10 @@ pub(super) struct Live {
     may_stop: bool,
     /// Whether it has ended and can get more trials.
     may_extend: bool,
+    /// The number of trials in the form that extends the study: as typed, or a suggestion.
+    pub(super) number_of_trials: String,
+    /// Why that form or a button was refused.
+    pub(super) refused: RefusedFields,
     pub(super) counts: TrialCounts,
     /// Why trials have no gait.
     without_gait: Option<TrialsWithoutGait>,
@@ -276,6 +281,8 @@ fn view(
         may_run,
         may_stop: transitions.contains(&StudyTransition::Stop),
         may_extend: transitions.contains(&StudyTransition::Extend),
+        number_of_trials: (snapshot.study.plan.number_of_trials + 5).to_string(),
+        refused: RefusedFields::default(),
         transitions: transitions.into_iter().filter_map(button).collect(),
         pace: String::new(),
         queued: String::new(),

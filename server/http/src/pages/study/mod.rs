@@ -12,39 +12,41 @@ mod without_gait;
 pub(super) use self::answers_table::{AnswerRow, answer_in_words, answers, assessment_in_words};
 pub(super) use self::best_gait::preferred;
 use self::live_part::{RunningRow, read_live, running_row};
-pub(super) use self::state_buttons::post;
+use self::state_buttons::{TransitionForm, press};
 use self::trials_table::TrialsQuery;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::extractors::Params;
+use crate::extractors::{Form, Params};
 use crate::format;
 use crate::page_error::{PageError, PageResult, page};
+use crate::refused_fields::{FormCheck, RefusedFields};
 use crate::units::Units;
 use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::http::StatusCode;
-use axum::response::{IntoResponse, Response};
-use gaitwright_service::access::{Administer, Read, RequiredRight, Run};
+use axum::response::{IntoResponse, Redirect, Response};
+use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
-use gaitwright_store::devices::{self, Device};
+use gaitwright_store::devices::{self, DeviceRow};
 use gaitwright_store::imports::{self, Import};
 use gaitwright_store::studies::Study;
-use gaitwright_store::subjects::{self, Subject};
+use gaitwright_store::subjects::{self, SubjectRow};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{
-    LabSessionId, StudyId, TrialId, consents, events, lab_sessions, reference_gaits, studies, trials,
+    LabSessionId, StudyId, TrialId, commit, consents, events, lab_sessions, reference_gaits, studies, trials,
 };
+use std::ops::ControlFlow;
 
 #[derive(Template)]
 #[template(path = "study.html")]
 struct StudyPage {
     units: Units,
     study: Study,
-    subject: Subject,
-    device: Device,
+    subject: SubjectRow,
+    device: DeviceRow,
     reference: String,
     live: String,
     /// Number of trials.
@@ -68,7 +70,7 @@ struct StudyPage {
 #[template(path = "study_closed.html")]
 struct ClosedPage {
     study: Study,
-    subject: Subject,
+    subject: SubjectRow,
     counts: TrialCounts,
     may_run: bool,
 }
@@ -87,12 +89,52 @@ pub(super) async fn get(
     Id(id, _): Id<StudyId, Read>,
     Params(choice): Params<TrialsQuery>,
 ) -> PageResult {
+    show(&mut app, &authorized.caller, units, id, choice, None).await
+}
+
+/// `POST /studies/{id}/do`.
+pub(super) async fn post(
+    authorized: Authorized<Run>,
+    State(mut app): State<AppState>,
+    units: Units,
+    Id(id, _): Id<StudyId, Run>,
+    Form(form): Form<TransitionForm>,
+) -> Result<Response, PageError> {
+    let mut check = FormCheck::new(&form);
+    let pressed = async {
+        let mut writer = app.write().await?;
+        let cancelled = press(&mut writer, &authorized.caller, id, &form).await?;
+        commit(writer).await?;
+        Ok(cancelled)
+    };
+    let pressed = pressed.await;
+    if let ControlFlow::Break(Some(cancelled)) = check.step(pressed)? {
+        for trial in cancelled {
+            app.scheduler.cancel_solve(trial).await;
+        }
+        app.scheduler.changed();
+        return Ok(Redirect::to(&format!("/studies/{id}")).into_response());
+    }
+    let refused = check.into_refused();
+    let status = refused.status();
+    let shown = show(&mut app, &authorized.caller, units, id, TrialsQuery::default(), Some((form, refused))).await?;
+    Ok((status, shown).into_response())
+}
+
+async fn show(
+    app: &mut AppState,
+    caller: &Caller,
+    units: Units,
+    id: StudyId,
+    choice: TrialsQuery,
+    refusal: Option<(TransitionForm, RefusedFields)>,
+) -> PageResult {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let subject = subjects::get(&mut reader, study.plan.subject_id).await?;
     if consents::is_withdrawn(&mut reader, id).await? {
         let counts = trials::counts(&mut reader, id).await?;
-        let may_run = authorized.caller.may(Run::NEEDED);
+        let may_run = caller.may(Run::NEEDED);
         return page(&ClosedPage { study, subject, counts, may_run });
     }
     let last_event = events::last(&mut reader, id).await?;
@@ -101,10 +143,13 @@ pub(super) async fn get(
     let imports = imports::of_study(&mut reader, id).await?;
     let sessions = lab_sessions::of_study(&mut reader, id).await?;
     drop(reader);
-    let live = read_live(&mut app, &authorized.caller, id, choice).await?;
+    let mut live = read_live(app, caller, id, choice).await?;
+    if let Some((form, refused)) = refusal {
+        (live.number_of_trials, live.refused) = (form.number_of_trials, refused);
+    }
     let (walks, trials) = (live.walker.has_place(), live.counts.total);
     let live = live.render().map_err(|e| Error::Internal(e.to_string()))?;
-    let may_administer = authorized.caller.may(Administer::NEEDED);
+    let may_administer = caller.may(Administer::NEEDED);
     let (variant, answer_source) =
         (format::variant(study.plan.muscles), format::answer_source(study.plan.answer_source));
     let simulated_walks = format::simulated_walks(&study.plan.simulated_walks);

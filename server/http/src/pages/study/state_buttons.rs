@@ -1,18 +1,12 @@
 //! The buttons that start, pause, resume, stop and extend a study.
 
-use crate::AppState;
-use crate::accessible::Id;
-use crate::authorization::Authorized;
-use crate::extractors::Form;
-use crate::page_error::PageError;
-use axum::extract::State;
-use axum::response::Redirect;
-use gaitwright_service::access::Run;
+use crate::refused_fields::{FieldLabels, TypedForm};
+use gaitwright_service::access::Caller;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::command;
 use gaitwright_service::studies::lifecycle::StudyTransition;
 use gaitwright_service::studies::study_extension::{self, StudyExtension};
-use gaitwright_store::{StudyId, commit};
+use gaitwright_store::{StudyId, TrialId, Writer};
 use serde::Deserialize;
 
 /// A button of the page.
@@ -22,40 +16,49 @@ pub(super) struct TransitionButton {
 }
 
 /// The form of a button.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 pub(in crate::pages) struct TransitionForm {
     transition: String,
     /// The new number of trials, for an extension.
     #[serde(default)]
-    number_of_trials: String,
+    pub(super) number_of_trials: String,
 }
 
-/// `POST /studies/{id}/do`.
-pub(in crate::pages) async fn post(
-    authorized: Authorized<Run>,
-    State(app): State<AppState>,
-    Id(id, _): Id<StudyId, Run>,
-    Form(form): Form<TransitionForm>,
-) -> Result<Redirect, PageError> {
-    let transition = StudyTransition::ALL
-        .into_iter()
-        .find(|transition| transition.as_str() == form.transition && is_offered_on_pages(*transition))
-        .ok_or_else(|| Error::invalid("transition", form.transition, "start, pause, resume, stop or extend"))?;
-    let mut writer = app.write().await?;
-    let cancelled = if transition == StudyTransition::Extend {
-        let refused = || Error::invalid("number_of_trials", form.number_of_trials.as_str(), "a whole number");
-        let more = StudyExtension { number_of_trials: form.number_of_trials.trim().parse().map_err(|_| refused())? };
-        study_extension::extend(&mut writer, &authorized.caller.actor, id, &more).await?;
-        Vec::new()
-    } else {
-        command::transition(&mut writer, &authorized.caller.actor, id, transition, "").await?.cancelled
-    };
-    commit(writer).await?;
-    for trial in cancelled {
-        app.scheduler.cancel_solve(trial).await;
+impl TransitionForm {
+    fn transition(&self) -> Result<StudyTransition, Error> {
+        StudyTransition::ALL
+            .into_iter()
+            .find(|transition| transition.as_str() == self.transition && is_offered_on_pages(*transition))
+            .ok_or_else(|| {
+                Error::invalid("transition", self.transition.as_str(), "start, pause, resume, stop or extend")
+            })
     }
-    app.scheduler.changed();
-    Ok(Redirect::to(&format!("/studies/{id}")))
+}
+
+impl TypedForm for TransitionForm {
+    const LABELS: FieldLabels = &[("number_of_trials", "Number of trials")];
+
+    /// Only one field can be refused.
+    fn repair(&mut self, _: &str) -> bool {
+        false
+    }
+}
+
+/// Does what a button asks for. Returns the trials whose solves were cancelled.
+pub(super) async fn press(
+    writer: &mut Writer,
+    caller: &Caller,
+    id: StudyId,
+    form: &TransitionForm,
+) -> Result<Vec<TrialId>, Error> {
+    let transition = form.transition()?;
+    if transition != StudyTransition::Extend {
+        return Ok(command::transition(writer, &caller.actor, id, transition, "").await?.cancelled);
+    }
+    let refused = || Error::invalid("number_of_trials", form.number_of_trials.as_str(), "a whole number");
+    let more = StudyExtension { number_of_trials: form.number_of_trials.trim().parse().map_err(|_| refused())? };
+    study_extension::extend(writer, &caller.actor, id, &more).await?;
+    Ok(Vec::new())
 }
 
 /// Whether the page has a button for it.

@@ -6,7 +6,7 @@ use crate::format::{self, words};
 use crate::paging::ListFingerprint;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_store::trial_list::{self, ListedTrial, Listing, SORTS, Start};
+use gaitwright_store::trial_list::{self, ListStart, ListedTrial, Listing, SORTS};
 use gaitwright_store::trials::{TrialCounts, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
@@ -79,11 +79,11 @@ impl TrialsQuery {
         ListFingerprint::of(&format!("/studies/{study}#trials"), &filter.to_vec())
     }
 
-    fn start(&self, list: &ListFingerprint) -> Result<Start, Error> {
+    fn start(&self, list: &ListFingerprint) -> Result<ListStart, Error> {
         Ok(match (self.after.as_str(), self.before.as_str()) {
-            ("", "") => Start::First,
-            ("", before) => Start::Before(list.key(before)?),
-            (after, _) => Start::After(list.key(after)?),
+            ("", "") => ListStart::First,
+            ("", before) => ListStart::Before(list.key(before)?),
+            (after, _) => ListStart::After(list.key(after)?),
         })
     }
 
@@ -175,7 +175,7 @@ impl TrialsTable {
         let page = |page: TrialsQuery| page.link();
         let earlier = earlier.map(|before| page(TrialsQuery { before, ..choice.first_page() })).transpose()?;
         // Trials can leave the list while it is open, so that nothing is left on a page.
-        let is_gone = first.is_none() && !matches!(listing.start, Start::First);
+        let is_gone = first.is_none() && !matches!(listing.start, ListStart::First);
         let earlier = if is_gone { Some(page(choice.first_page())?) } else { earlier };
         Ok(Self {
             any: counts.total > 0,

@@ -227,7 +227,7 @@ pub(crate) struct AuditDetail {
     walk: u8,
     /// Number of simulated walks on each kind of ground: `trial.request_execution_report`, `trial.report_execution`.
     #[schema(required = false)]
-    simulated_walks: u32,
+    number_of_simulated_walks: u32,
     /// `trial.relax`: the trial without a gait whose bounds were relaxed.
     #[schema(required = false)]
     without_gait: TrialId,

@@ -123,7 +123,7 @@ impl<R: Read> Read for Hashed<R> {
     }
 }
 
-type Source<R> = BufReader<Hashed<R>>;
+type HashedReader<R> = BufReader<Hashed<R>>;
 
 /// Facts about a completely read archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -138,7 +138,7 @@ pub struct ArchiveFacts {
 
 /// Reads an archive row by row.
 pub(super) struct Unpacker<R: Read> {
-    lines: BufReader<zstd::Decoder<'static, Source<R>>>,
+    lines: BufReader<zstd::Decoder<'static, HashedReader<R>>>,
     hash: Sha256,
     bytes: u64,
     rows: u64,

@@ -78,6 +78,65 @@ mod tests {
     use super::super::gait_map::tests::solved;
     use super::*;
     use crate::studies::bound_grid;
+    use gait_learner::ActionIndex;
+    use gait_optimizer::{GaitSettings, SolveOptions, Subject, TunedBounds};
+    use gaitwright_compute::Pool;
+
+    /// The solve of the default bounds, and a map with the gaits of these actions.
+    fn atlas(settings: GaitSettings, actions: &[u64]) -> (Family, GaitMap) {
+        let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
+        problem.settings = settings;
+        let (options, cancel) = (SolveOptions::default(), CancelToken::default());
+        let space = bound_grid::table_i().unwrap();
+        let root = solve(&problem, None, &options, &mut |_| {}, &cancel).unwrap();
+        let nearest = bound_grid::nearest_action(&space, TunedBounds::default()).unwrap();
+        let mut map = GaitMap::new(space, SolvedAction::of(nearest, &root, &problem.reference).unwrap());
+        let family = Family { problem, options, root: root.warm_start };
+        for action in actions.iter().copied().map(ActionIndex) {
+            let bounds = map.bounds_of(family.problem.bounds, action).unwrap();
+            let problem = GaitProblem { bounds, ..family.problem.clone() };
+            let outcome = solve(&problem, Some(&family.root), &family.options, &mut |_| {}, &cancel).unwrap();
+            map.add(SolvedAction::of(action, &outcome, &problem.reference).unwrap());
+        }
+        (family, map)
+    }
+
+    fn found(family: Family, map: GaitMap) -> BestCertifiedGaitSearch {
+        let runtime = tokio::runtime::Runtime::new().unwrap();
+        let search = move |pool: &OnPool| search(pool, &family, &map, &mut |_| {}, &CancelToken::default());
+        runtime.block_on(Pool::new(1).run(search)).unwrap().unwrap()
+    }
+
+    /// The certificates of all gaits are computed here, without the search.
+    #[test]
+    fn best_gait_is_the_certified_one_with_the_lowest_gait_rmse() {
+        let (family, map) = atlas(GaitSettings::default(), &[0, 4000, 8000, 11_000]);
+        let mut table = Vec::new();
+        for row in map.rows().filter(|row| row.number.is_some()) {
+            let bounds = map.bounds_of(family.problem.bounds, row.solved.action).unwrap();
+            let problem = GaitProblem { bounds, ..family.problem.clone() };
+            let options = &family.options;
+            let outcome = solve(&problem, Some(&family.root), options, &mut |_| {}, &CancelToken::default()).unwrap();
+            let passed = certify(&outcome.gait).unwrap().passed;
+            table.push((outcome.report.gait_rmse_rad, row.number.unwrap(), passed));
+        }
+        table.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        table.dedup_by_key(|gait| gait.1);
+        assert!(table.len() > 2, "{table:?}");
+        let place = table.iter().position(|(_, _, passed)| *passed).unwrap();
+        let BestCertifiedGaitSearch::Found { best, failed } = found(family, map) else { panic!("{table:?}") };
+        let (rmse, number, _) = table[place];
+        assert_eq!((best.number, best.outcome.report.gait_rmse_rad, failed), (number, rmse, place), "{table:?}");
+        assert!(best.certificate.passed);
+    }
+
+    #[test]
+    fn gaits_on_a_mesh_that_is_too_coarse_are_not_certified() {
+        let mut settings = GaitSettings::default();
+        (settings.mesh.ds2, settings.mesh.ds3, settings.mesh.ss2, settings.mesh.ss1) = (2, 2, 3, 3);
+        let (family, map) = atlas(settings, &[]);
+        assert!(matches!(found(family, map), BestCertifiedGaitSearch::NoneCertified));
+    }
 
     #[test]
     fn gaits_are_tried_once_each_in_the_order_of_gait_rmse() {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// The first line.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Header {
+struct ProgressFileHeader {
     version: String,
     /// SHA-256 of problem, options and root gait.
     problem_sha256: String,
@@ -36,13 +36,13 @@ impl ProgressFile {
         }
         let mut text = String::new();
         file.read_to_string(&mut text).map_err(io)?;
-        let header = Header {
+        let header = ProgressFileHeader {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             problem_sha256: gaitwright_store::sha256(input.to_json()?.as_bytes()),
         };
         let whole = text.rfind('\n').map_or(0, |end| end + 1);
         let mut lines = text[..whole].lines();
-        match lines.next().map(serde_json::from_str::<Header>) {
+        match lines.next().map(serde_json::from_str::<ProgressFileHeader>) {
             None => {
                 let line = serde_json::to_string(&header).map_err(|e| Error::Internal(e.to_string()))?;
                 file.set_len(0).and_then(|()| file.rewind()).and_then(|()| writeln!(file, "{line}")).map_err(io)?;

@@ -8,7 +8,7 @@ use crate::studies::walkable::{self, Grounds, NotWalkable, WalkableGait};
 use gaitwright_store::allocations::{self, RandomDraw};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::lab_sessions::{self, LabSession, SessionStep};
-use gaitwright_store::trial_list::{self, ListedTrial, Listing, Start};
+use gaitwright_store::trial_list::{self, ListStart, ListedTrial, Listing};
 use gaitwright_store::trials::{self, Trial, TrialState};
 use gaitwright_store::{Connection, Instant, LabSessionId, StoreResult, StudyId, TrialId, Writer, consents, studies};
 use serde::{Deserialize, Serialize};
@@ -63,7 +63,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
         state: Some(TrialState::Converged),
         contains: String::new(),
         limit,
-        start: Start::First,
+        start: ListStart::First,
     };
     let grounds = Grounds::read(db, study).await?;
     let mut converged = Vec::new();

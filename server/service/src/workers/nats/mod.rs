@@ -14,4 +14,4 @@ mod worker;
 pub use broker_connection::reach;
 pub use engine::JetStream;
 pub use message::{ResultMessage, Sign, SolveOrder, pack, unpack};
-pub use worker::Worker;
+pub use worker::NatsWorker;

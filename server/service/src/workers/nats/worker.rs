@@ -32,7 +32,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(15);
 const SIGN_EVERY: Duration = Duration::from_millis(300);
 
 /// Runs jobs of a broker.
-pub struct Worker {
+pub struct NatsWorker {
     link: BrokerConnection,
     name: String,
     engine: InProcess,
@@ -54,9 +54,9 @@ struct HeldJob {
     permit: OwnedSemaphorePermit,
 }
 
-type Job = (jetstream::Message, OwnedSemaphorePermit);
+type PulledJob = (jetstream::Message, OwnedSemaphorePermit);
 
-impl Worker {
+impl NatsWorker {
     /// Connects to a broker, for at most `size` parallel jobs. Waits for a broker that is not available yet.
     ///
     /// # Errors
@@ -112,7 +112,7 @@ impl Worker {
     }
 
     /// Pulls a job whenever a slot is free.
-    async fn pull(&self, jobs: Sender<Job>) {
+    async fn pull(&self, jobs: Sender<PulledJob>) {
         while let Ok(permit) = Arc::clone(&self.slots).acquire_owned().await {
             let mut slot = Some(permit);
             while let Some(permit) = slot.take() {
@@ -139,7 +139,7 @@ impl Worker {
         batch.next().await.transpose().map_err(unreachable)
     }
 
-    async fn take(&self, held: &mut HashMap<TrialId, HeldJob>, (message, permit): Job) {
+    async fn take(&self, held: &mut HashMap<TrialId, HeldJob>, (message, permit): PulledJob) {
         let (message, acker) = message.split();
         let order = match unpack::<SolveOrder>(&message.payload) {
             Ok(order) => order,
