@@ -84,7 +84,7 @@ JointAngleFormat = Literal["opensim", "camargo", "csv"]
 LabSessionId = str
 
 # State of a lab session: `planned`, no walk is recorded; `under_way`, at least one walk is recorded; `answered`, the
-# subject has answered, so no walk is left; `closed`, the session accepts no more data.
+# subject has answered, so no walk is left; `closed`, the session accepts no more data except safety reports.
 LabSessionState = Literal["planned", "under_way", "answered", "closed"]
 
 # Label of a trial: `converged`, the evaluation found a gait; `not_converged`, it found none, which is a result, too;
@@ -152,9 +152,9 @@ SessionId = str
 # How a user signed in.
 SignInMethod = Literal["link", "password"]
 
-# What the simulated walks with a new gait do in a study: `none`, the service simulates none by itself; `report`, each
-# gait gets an execution report; `tie_break`, the report also decides between two gaits with nearly the same Gait RMSE;
-# `label`, a gait that walks too few strides gets the label `not_executable`.
+# Effect of simulated walks with each gait on a study: `none`, the service simulates none by itself; `report`, each gait
+# gets an execution report; `tie_break`, the report also decides between two gaits with nearly the same Gait RMSE;
+# `label`, a gait with too few mean strides gets the label `not_executable`.
 SimulatedWalksEffect = Literal["none", "report", "tie_break", "label"]
 
 # How a solve ended: `converged`, every constraint is satisfied; `infeasible`, at a local minimum of the violation, with
@@ -275,7 +275,7 @@ class AnswerRetraction(_AnswerRetractionRequired, total=False):
 
 
 class AnswerUndo(TypedDict, total=False):
-    """Undo of an answer."""
+    """Request to undo an answer."""
 
     # Who undoes the answer. Defaults to the caller's name.
     author: Optional[str]
@@ -447,7 +447,7 @@ AuditDetail = TypedDict(
         "role": "Role",
         # `gait.review`: the safety reports that were reviewed.
         "safety_reports": "list[AuditedSafetyReport]",
-        # `record.backup`: true.
+        # `record.backup`: always true.
         "scheduled": "bool",
         # `token.create`: scopes of the token.
         "scopes": "list[Right]",
@@ -846,7 +846,8 @@ class ControllerFile(_ControllerFileRequired, total=False):
     are positive. R is the prosthesis, L the intact leg.
     """
 
-    # Whether the gait passed its certificate. Absent in the file of a blinded walk, because it could identify the gait.
+    # Whether the certificate of the gait passed. Absent in the file of a blinded walk, because it could identify the
+    # gait.
     certificate_passed: bool
 
 
@@ -1091,7 +1092,7 @@ class DomainTrajectory(TypedDict):
     # Name: DS2 and DS3 for double support, SS2 and SS1 for single support on the flat foot and on the toe, with _R or
     # _L for the stance leg.
     name: str
-    # Coordinates that the virtual constraints drive, as places in a row of `q`, from 0.
+    # Coordinates that the virtual constraints drive, as indices into a row of `q`, counted from 0.
     outputs: list[int]
     # Hip position at the end of the domain, where the phase is 1, m.
     phase_end_m: float
@@ -1135,7 +1136,7 @@ class EmgReading(TypedDict, total=False):
     heel_strikes_s: list[float]
     # Sampling rate of a CSV file without a `time_s` column, Hz.
     rate_hz: Optional[float]
-    # Numbers of strides to leave out, from 1, in the order of the heel strikes.
+    # Numbers of the strides to leave out, counted from 1 in the order of the heel strikes.
     rejected_strides: list[int]
 
 
@@ -1562,7 +1563,7 @@ class LabAnswer(TypedDict):
 
 
 class LabSessionClosing(TypedDict, total=False):
-    """Closing of a session."""
+    """Request to close a lab session."""
 
     # Note, at most 2000 characters.
     note: str
@@ -1604,7 +1605,7 @@ class LabSessionStep(TypedDict):
 
 
 class LabSessionUnblinding(TypedDict):
-    """Session to unblind, with the reason."""
+    """Request to unblind a lab session."""
 
     # Reason, 1 to 2000 characters.
     reason: str
@@ -1676,7 +1677,7 @@ class LearnerSettings(TypedDict, total=False):
     # best action of a posterior sample over the whole search space; `information_gain`, the action whose feedback is
     # expected to tell the most about the utility; `random`, a random action that has not been tried.
     method: Literal["linecospar", "eubo", "thompson", "information_gain", "random"]
-    # Noise scale of answers of no difference, in units of utility.
+    # Noise scale of answers that state no difference, in units of utility.
     no_difference_noise: float
     # Difference in utility below which two gaits feel equal.
     no_difference_width: float
@@ -1753,6 +1754,23 @@ class LinearAlgebra(TypedDict):
     seconds_solves: float
     # Number of forward and backward substitutions.
     substitutions: int
+
+
+class LocalOptimum(TypedDict):
+    """A local optimum that the cold start of a trial reached."""
+
+    # Gait RMSE against the reference gait of the study, rad.
+    gait_rmse_rad: float
+    # Whether its gait is the result of the trial.
+    is_result: bool
+    # Its number, from 1, in the order in which the initial guesses reached them.
+    number: int
+    # Objective.
+    objective: float
+    # Walking speed, m/s.
+    speed_m_s: float
+    # Stride length, m.
+    stride_length_m: float
 
 
 class MeasurementFile(TypedDict):
@@ -2028,8 +2046,8 @@ class NewAssessment(_NewAssessmentRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Identifier of the preference or assessment that this assessment replaces: an answer of a person about the same two
-    # trials, which no longer counts. If this assessment is undone, the replaced one counts again.
+    # Identifier of the preference or assessment that this assessment replaces: a person's answer about the same two
+    # trials, which then no longer counts. If this assessment is undone, the replaced one counts again.
     replaces: Optional[AnswerId]
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
@@ -2145,8 +2163,8 @@ class NewPreference(_NewPreferenceRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Identifier of the preference or assessment that this answer replaces: an answer of a person about the same two
-    # trials, which no longer counts. If this answer is undone, the replaced one counts again.
+    # Identifier of the preference or assessment that this answer replaces: a person's answer about the same two trials,
+    # which then no longer counts. If this answer is undone, the replaced one counts again.
     replaces: Optional[AnswerId]
     # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     # `clinician` for any other user.
@@ -2243,7 +2261,8 @@ class NewStudy(_NewStudyRequired, total=False):
     # Whether the muscles are part of the gait problem (constraints C1 to C12 of the published method) or not (C1 to
     # C4).
     muscles: bool
-    # Name shown to users, which no other study that you can see has. Made from subject and variant by default.
+    # Name shown to users, which must differ from the names of all studies that you can see. By default, it is made from
+    # subject, variant and seed.
     name: Optional[str]
     # Number of trials.
     number_of_trials: int
@@ -2262,7 +2281,7 @@ class NewStudy(_NewStudyRequired, total=False):
     search_space: Optional[SearchSpace]
     # Seed for all random draws except allocations.
     seed: int
-    # Simulated walks with each gait. They do nothing by default.
+    # Simulated walks with each gait. By default, the service simulates none.
     simulated_walks: SimulatedWalksSetting
     # Options of the solver: limits, tolerance, initial guesses and retries.
     solve_options: SolveOptions
@@ -2399,11 +2418,11 @@ class PrimalDualPoint(TypedDict):
     lower_multipliers: list[float]
     # m multipliers of the rows.
     row_multipliers: list[float]
-    # m multipliers of the lower bounds of slacks. Empty: from the multipliers of the rows.
+    # m multipliers of the lower bounds of slacks. If empty, they are derived from the multipliers of the rows.
     slack_lower_multipliers: list[float]
-    # m multipliers of the upper bounds of slacks. Empty: from the multipliers of the rows.
+    # m multipliers of the upper bounds of slacks. If empty, they are derived from the multipliers of the rows.
     slack_upper_multipliers: list[float]
-    # m slacks of the rows. Empty: the values of the rows.
+    # m slacks of the rows. If empty, the values of the rows are used.
     slacks: list[float]
     # n multipliers of the upper bounds of variables.
     upper_multipliers: list[float]
@@ -2536,7 +2555,7 @@ class _RecommendationRequired(Recommended):
     certifying: bool
     # Reasons if the certificate failed.
     failures: list[str]
-    # Tuned bounds that were active in no gait of the study so far.
+    # Tuned bounds that have not been active in any gait of the study so far.
     never_active: list[str]
     # Name of the study.
     study: str
@@ -2549,7 +2568,7 @@ class Recommendation(_RecommendationRequired, total=False):
 
     # The newest execution report of its gait. Null if there is none.
     execution_report: Optional[ExecutionReport]
-    # If the certificate failed, the best action whose gait passed. Null if there is none.
+    # If the certificate failed, the best action whose gait passed certification. Null if there is none.
     passing: Optional[Recommended]
 
 
@@ -2869,12 +2888,11 @@ class SimulatedWalksSetting(TypedDict, total=False):
     disturbances.
     """
 
-    # What they do.
+    # Effect of the simulated walks on the study.
     effect: SimulatedWalksEffect
-    # `tie_break`: two gaits whose Gait RMSE differs by less, rad, are compared by their mean strides. 0 to 10.
+    # `tie_break`: difference in Gait RMSE, rad, below which two gaits are compared by their mean strides. 0 to 10.
     gait_rmse_tolerance_rad: float
-    # `label`: the least mean number of strides of an executable gait. A complete simulated walk has 20 strides. 0 to
-    # 20.
+    # `label`: minimum mean strides of an executable gait. A complete simulated walk has 20 strides. 0 to 20.
     least_mean_strides: float
     # Number of simulated walks on each of the three kinds of ground, 1 to 1000.
     number_of_simulated_walks: int
@@ -2905,19 +2923,20 @@ class SolveOptionsSolver(TypedDict, total=False):
     # First regularisation of the Hessian. Default 1e-4.
     hessian_regularisation_first: float
     # Factorisation of the linear systems: `multifrontal`, pivots within blocks; `delayed_pivots`, pivots by a
-    # threshold, slower; `auto`, the first one, and the second one where it is inaccurate. Default `auto`.
+    # threshold, slower; `auto`, `multifrontal`, or `delayed_pivots` where the former is inaccurate. Default `auto`.
     linear_solver: Literal["auto", "multifrontal", "delayed_pivots"]
     # Maximum number of second-order corrections in each iteration. Default 1.
     max_second_order_corrections: int
-    # Initial weight of the proximal term after steps that the line search shortened often. Default 1e-4. 0 disables the
-    # term.
+    # Initial weight of the proximal term after a step that the line search shortened many times. Default 1e-4. 0
+    # disables the term.
     proximal_first: float
     # After the unregularised matrix has had the wrong inertia twice in a row, this many iterations start from a reduced
     # regularisation. Each further time adds one iteration. Default 4.
     regularisation_memory: int
     # Share of the violation at which the restoration phase ends if the filter accepts the point. Default 0.9.
     required_reduction: float
-    # Number of consecutive steps below 0.05 after which the restoration phase starts. Default 5. 0: never.
+    # Number of consecutive steps below 0.05 after which the restoration phase starts. Default 5. With 0, short steps do
+    # not start it.
     short_step_limit: int
 
 
@@ -2927,8 +2946,9 @@ class SolveOptions(TypedDict, total=False):
     # Minimum number of initial guesses of a cold start.
     initial_guesses: int
     # Which one of several local optima is the result: `lowest_objective`, or `nearest_to_reference`, the one with the
-    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent.
-    local_optimum_choice: Union[Literal["lowest_objective"], SolveOptionsLocalOptimumChoice]
+    # lowest Gait RMSE among those whose objective exceeds the lowest by at most `within_percent` per cent, or
+    # `numbered`, the one with this number among those that the cold start reached.
+    local_optimum_choice: Union[Literal["lowest_objective"], SolveOptionsLocalOptimumChoice, SolveOptionsLocalOptimumChoice]
     # Maximum number of iterations in each phase of a solve. Phases that track the reference gait are limited to 200.
     max_iterations: int
     # Whether a cold start tries further initial guesses until one converges.
@@ -3133,7 +3153,7 @@ class StudyChange(TypedDict, total=False):
     # Whether the study is archived. Lists leave out archived studies unless they are asked for. A study can be archived
     # before its start and after its end.
     archived: Optional[bool]
-    # Name shown to users, which no other study that you can see has.
+    # Name shown to users, which must differ from the names of all other studies that you can see.
     name: Optional[str]
     # Free-text notes.
     notes: Optional[str]
@@ -3152,7 +3172,8 @@ class StudyClone(TypedDict, total=False):
     answer_source: Optional[AnswerSource]
     # Whether to solve with muscles.
     muscles: Optional[bool]
-    # Name shown to users, which no other study that you can see has. That of the parent and "(clone)" by default.
+    # Name shown to users, which must differ from the names of all studies that you can see. By default, it is the name
+    # of the parent with "(clone)" appended.
     name: Optional[str]
     # Number of trials.
     number_of_trials: Optional[int]
@@ -3204,7 +3225,7 @@ class StudyExtension(TypedDict):
 class StudyRestriction(TypedDict):
     """Access to a study."""
 
-    # Whether only members and administrators can access the study. Raters must be members in any case.
+    # Whether only members and administrators can access the study. Raters must always be members.
     restricted: bool
 
 
@@ -3322,7 +3343,7 @@ class Trial(TypedDict):
     # Largest violation, scaled. Null without a completed solve.
     max_violation: Optional[float]
     # Mean strides of the simulated walks on which the result of the trial depends. Null if the trial has no gait, or if
-    # the study compares and labels no gait by simulated walks.
+    # the results of the study do not depend on simulated walks.
     mean_strides: Optional[float]
     # Human-readable message about how the trial ended; may be empty.
     message: str

@@ -71,16 +71,26 @@ class FiguresMethods(Transport):
             query={"other": other},
         )
 
-    def get_trial_figure(self, trial_id: TrialId, file: str, *, other: Optional[TrialId] = None) -> bytes:
+    def get_trial_figure(
+        self,
+        trial_id: TrialId,
+        file: str,
+        *,
+        other: Optional[TrialId] = None,
+        local_optimum: Optional[int] = None,
+    ) -> bytes:
         """Download a figure of a trial.
 
-        While the solve is running, shows its progress. With another trial, shows the joint angles of both.
+        While the solve is running, shows its progress. With another trial, shows the joint angles of both. With a local
+        optimum, shows the gait of that one.
 
         other: Identifier of a converged trial of the same study for comparison.
+
+        local_optimum: Number of another local optimum of the trial. Without `other`.
         """
         return self.request_bytes(
             "GET",
             "/api/v1/trials/{id}/figures/{file}",
             {"id": trial_id, "file": file},
-            query={"other": other},
+            query={"other": other, "local_optimum": local_optimum},
         )

@@ -75,7 +75,7 @@ class LabMethods(Transport):
     ) -> LabSessionView:
         """Close a lab session.
 
-        A closed session accepts no more data.
+        A closed session accepts no more data except safety reports.
 
         Fields: optionally note.
         """
@@ -134,8 +134,7 @@ class LabMethods(Transport):
     ) -> EmgView:
         """Create an EMG result.
 
-        Processes EMG recordings: filters, segments and normalises the newest EMG recordings. Can be repeated with other
-        settings.
+        Filters, segments and normalises the newest EMG recording of each walk. Can be repeated with other settings.
 
         Fields: optionally settings.
         """
@@ -225,7 +224,7 @@ class LabMethods(Transport):
     def get_next_walk(self, lab_session_id: LabSessionId) -> LabSessionProgress:
         """Get the next walk of a lab session.
 
-        The view for the lab, without anything that reveals a gait.
+        The response omits all data that would reveal a gait.
         """
         return cast(
             LabSessionProgress,

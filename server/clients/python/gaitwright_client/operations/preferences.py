@@ -101,7 +101,7 @@ class PreferencesMethods(Transport):
         """Retract a preference.
 
         The preference stays on record, but the learner no longer uses it. An answer that it replaced does not count
-        again: for that, undo it.
+        again; to restore that answer, undo the preference instead.
 
         Fields: reason; optionally author.
         """

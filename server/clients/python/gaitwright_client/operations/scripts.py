@@ -54,7 +54,7 @@ class ScriptsMethods(Transport):
     ) -> Trial:
         """Tell the service the result of a trial.
 
-        That there is no gait is also a result. If the script fails, cancel the trial instead.
+        `not_converged` is also a result. If the script fails, cancel the trial instead.
 
         Fields: label; optionally cost_of_transport, gait_rmse_rad, reason.
         """

@@ -16,6 +16,7 @@ from ..schemas import (
     GaitMotion,
     Iteration,
     Job,
+    LocalOptimum,
     NewExecutionReport,
     SolveProblem,
     StudyId,
@@ -50,7 +51,7 @@ class TrialsMethods(Transport):
         """List trials of a study.
 
         Sorted by number, unless `sort` names another column. A trial whose value in that column changes while a client
-        reads the pages can be missing or occur twice; no number of a trial changes.
+        reads the pages can be missing or occur twice. The number of a trial never changes.
 
         state: Only trials in this state.
 
@@ -194,12 +195,23 @@ class TrialsMethods(Transport):
             ),
         )
 
-    def get_gait(self, trial_id: TrialId) -> GaitDocument:
+    def get_gait(self, trial_id: TrialId, *, local_optimum: Optional[int] = None) -> GaitDocument:
         """Get the gait of a trial.
 
-        The trajectory in the format of the optimiser.
+        The trajectory in the format of the optimiser. A gait of another local optimum satisfies the bounds at the
+        nodes.
+
+        local_optimum: Number of another local optimum of the trial.
         """
-        return cast(GaitDocument, self.request_json("GET", "/api/v1/trials/{id}/gait", {"id": trial_id}))
+        return cast(
+            GaitDocument,
+            self.request_json(
+                "GET",
+                "/api/v1/trials/{id}/gait",
+                {"id": trial_id},
+                query={"local_optimum": local_optimum},
+            ),
+        )
 
     def get_gait_csv(self, trial_id: TrialId) -> str:
         """Download the gait of a trial as CSV."""
@@ -218,6 +230,15 @@ class TrialsMethods(Transport):
         The iterations of the running solve so far, or the recorded ones of a solve that has ended. Sorted by iteration.
         """
         return Pages(self, "/api/v1/trials/{id}/iterations", {"id": trial_id}, query={"limit": page_size})
+
+    def list_local_optima(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[LocalOptimum]:
+        """List local optima of a trial.
+
+        The gaits that the initial guesses of its cold start led to, by number; one of them is the result of the trial.
+        Each is a candidate for the root gait of a study: `solve_options.local_optimum_choice` can name its number.
+        Empty after a warm start, without a gait, and in imported studies.
+        """
+        return Pages(self, "/api/v1/trials/{id}/local-optima", {"id": trial_id}, query={"limit": page_size})
 
     def get_gait_motion(self, trial_id: TrialId) -> GaitMotion:
         """Get the motion of a gait.
