@@ -250,7 +250,7 @@ pub(super) struct Note {
 /// The label of the note with which a session is closed.
 const CLOSING: FieldLabels = &[("note", "Note")];
 /// The label of the reason for unblinding.
-const UNBLINDING: FieldLabels = &[("note", "Reason")];
+const UNBLINDING: FieldLabels = &[("reason", "Reason")];
 
 /// `POST /lab-sessions/{id}/close`.
 pub(super) async fn close(
