@@ -234,9 +234,9 @@ class TrialsMethods(Transport):
     def list_local_optima(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[LocalOptimum]:
         """List local optima of a trial.
 
-        The gaits that the initial guesses of its cold start led to, by number; one of them is the result of the trial.
-        Each is a candidate for the root gait of a study: `solve_options.local_optimum_choice` can name its number.
-        Empty after a warm start, without a gait, and in imported studies.
+        The gaits that the initial guesses of its cold start led to; one of them is the result of the trial. Sorted by
+        number. Each is a candidate for the root gait of a study: `solve_options.local_optimum_choice` can name its
+        number. Empty after a warm start, without a gait, and in imported studies.
         """
         return Pages(self, "/api/v1/trials/{id}/local-optima", {"id": trial_id}, query={"limit": page_size})
 
