@@ -19,7 +19,7 @@ use serde::Deserialize;
 /// Which gait of a trial.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct GaitQuery {
+pub(super) struct LocalOptimumQuery {
     local_optimum: Option<u32>,
 }
 
@@ -42,7 +42,7 @@ pub(super) async fn get(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
-    Params(GaitQuery { local_optimum }): Params<GaitQuery>,
+    Params(LocalOptimumQuery { local_optimum }): Params<LocalOptimumQuery>,
 ) -> Result<Response, Refusal> {
     let mut reader = app.read().await?;
     let gait = match local_optimum {
