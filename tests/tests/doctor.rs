@@ -7,7 +7,7 @@ use gaitwright_tests::broker::Broker;
 use gaitwright_tests::cli;
 use gaitwright_tests::every_table::filled;
 use gaitwright_tests::serve_process::Process;
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::skipped;
 use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection};
 use std::path::Path;

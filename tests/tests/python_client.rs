@@ -7,8 +7,8 @@
 use gaitwright_store::studies::StudyState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
-use gaitwright_tests::skipped::skipped_unless_required;
 use serde_json::Value;
+use skipped_tests::skipped_unless_required;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
