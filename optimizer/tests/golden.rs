@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
 mod golden_gaits;
-mod skipped;
 
 use gait_optimizer::activation_alternations::activation_alternations;
 use gait_optimizer::gait::{kept_clearance_m, progress};
@@ -183,7 +182,7 @@ fn cold_starts_take_at_most_the_expected_iterations() {
     assert!(rows.iter().all(|row| row.status == "Converged"));
     let guesses = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE];
     let starts = [(1, false), (2, false), (1, true), (2, true)].map(|(s, m)| guesses.map(|guess| (s, m, guess)));
-    let long = !skipped::long_tests_are_skipped(" for all but two starts");
+    let long = !skipped_tests::long_tests_are_skipped(" to run more than two starts");
     let (mut taken, mut expected) = (0.0, (0.0, 0.0));
     for (subject, muscles, guess) in starts.into_iter().flatten().take(if long { 8 } else { 2 }) {
         let problem = GaitProblem::new(Subject::builtin(subject).unwrap(), muscles).unwrap();

@@ -3,8 +3,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-mod skipped;
-
 use gait_optimizer::{
     CancelToken, GaitProblem, GaitSettings, InitialGuess, Mesh, SolveOptions, SolveStatus, Subject, TunedBounds,
     solve_from_guesses,
@@ -31,7 +29,7 @@ const MAY_GIVE_UP: usize = 1;
 
 #[test]
 fn infeasible_solves_end_at_stationary_points_of_the_violation() {
-    let long = !skipped::long_tests_are_skipped(" for all but six starts on a coarse mesh");
+    let long = !skipped_tests::long_tests_are_skipped(" to run more than six starts on a coarse mesh");
     let options = SolveOptions { threads: 2, ..SolveOptions::default() };
     let mut gave_up = Vec::new();
     let guesses = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE];
@@ -66,7 +64,7 @@ fn infeasible_solves_end_at_stationary_points_of_the_violation() {
 /// Near the boundary of feasibility steps become very short, and the restoration phase must take over.
 #[test]
 fn long_nearly_infeasible_solve_ends_before_its_iteration_limit() {
-    if skipped::long_tests_are_skipped("") {
+    if skipped_tests::long_tests_are_skipped("") {
         return;
     }
     let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), true).unwrap();

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::expect_used)]
 
-mod skipped;
-
 use gait_optimizer::body::{Axis, Side};
 use gait_optimizer::certificate::certify;
 use gait_optimizer::explanation::explain;
@@ -308,7 +306,7 @@ fn converged_solve_has_no_explanation() {
 
 #[test]
 fn explanation_names_relaxations_that_give_a_gait() {
-    if skipped::long_tests_are_skipped("") {
+    if skipped_tests::long_tests_are_skipped("") {
         return;
     }
     let bounds = "a2=40,a3=0.5,a4=1.2,a5=0.1,a6=0,a7=15,a8=15";

@@ -1,6 +1,6 @@
 //! A NATS broker as a process, with its own folder.
 
-use crate::skipped::skipped_unless_required;
+use skipped_tests::skipped_unless_required;
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;

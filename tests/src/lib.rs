@@ -26,7 +26,6 @@ pub mod scripted;
 pub mod serve_process;
 pub mod service;
 pub mod simulated;
-pub mod skipped;
 pub mod sources;
 pub mod users;
 pub mod well_formed;

@@ -20,10 +20,10 @@ use gaitwright_tests::consistent_gaits::Consistent;
 use gaitwright_tests::page_routes;
 use gaitwright_tests::read_allocations::{gait_a_first, sides};
 use gaitwright_tests::service::{Answer, Service};
-use gaitwright_tests::skipped::skipped;
 use gaitwright_tests::sources;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use skipped_tests::long_tests_are_skipped;
 use sqlx::{AssertSqlSafe, Column, Row, TypeInfo, ValueRef};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -157,8 +157,7 @@ async fn sessions_unblinded_one_after_another_stay_balanced() {
 /// Minutes, so only with `GAITWRIGHT_LONG_TESTS=1`.
 #[tokio::test]
 async fn allocations_of_10_000_sessions_are_balanced_in_any_order_of_unblinding() {
-    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        skipped("set GAITWRIGHT_LONG_TESTS=1");
+    if long_tests_are_skipped("") {
         return;
     }
     let (_folder, service) = one_service().await;

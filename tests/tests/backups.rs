@@ -6,7 +6,7 @@ use gaitwright_store::backup_folder::BackupFolder;
 use gaitwright_store::{Store, StoreError, anchor, backup, commit, verify};
 use gaitwright_tests::cli;
 use gaitwright_tests::every_table::filled;
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::skipped;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{AssertSqlSafe, Connection};
 use std::path::Path;

@@ -7,11 +7,14 @@ use gaitwright_tests::broker::Broker;
 use gaitwright_tests::cli;
 use gaitwright_tests::every_table::filled;
 use gaitwright_tests::serve_process::Process;
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::skipped;
 use sqlx::sqlite::SqliteConnection;
 use sqlx::{AssertSqlSafe, Connection};
+use std::fs::Permissions;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 use std::time::{Duration, SystemTime};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
@@ -21,8 +24,7 @@ fn doctor(folder: &Path, arguments: &[&str]) -> (Option<i32>, Vec<String>) {
     let address: &[&str] = if arguments.contains(&"--listen") { &[] } else { &["--listen", "127.0.0.1:0"] };
     let arguments: Vec<&str> = ["doctor"].iter().chain(address).chain(arguments).copied().collect();
     let output = cli::run(BINARY, folder, &arguments);
-    let text = String::from_utf8(output.stdout).unwrap();
-    (output.status.code(), text.lines().map(str::to_owned).collect())
+    (output.status.code(), lines_of(&output))
 }
 
 /// The only error of a run, which fails.
@@ -39,6 +41,28 @@ fn only_error((code, lines): (Option<i32>, Vec<String>)) -> String {
 #[track_caller]
 fn line<'a>(lines: &'a [String], check: &str) -> &'a str {
     lines.iter().find(|line| line.split_whitespace().nth(1) == Some(check)).expect("the check")
+}
+
+/// Why both `doctor` and `serve` refuse a record.
+#[track_caller]
+fn refused_by_both(folder: &Path, user: Option<u32>, database: &str) -> String {
+    let run = |name| {
+        let mut command = cli::command(BINARY, folder, &[name, "--listen", "127.0.0.1:0", "--database", database]);
+        if let Some(user) = user {
+            command.uid(user);
+        }
+        command.output().unwrap()
+    };
+    let (doctor, serve) = (run("doctor"), run("serve"));
+    let record = only_error((doctor.status.code(), lines_of(&doctor)));
+    let reason = record.split_once("record").expect("the check of the record").1.trim();
+    let refused = String::from_utf8(serve.stderr).unwrap();
+    assert!(!serve.status.success() && refused.contains(reason), "{record}\n{refused}");
+    record
+}
+
+fn lines_of(output: &Output) -> Vec<String> {
+    String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
 }
 
 async fn change(database: &Path, sql: &str) {
@@ -60,6 +84,10 @@ fn doctor_describes_a_machine_without_a_record_and_creates_nothing() {
     assert!(lines.iter().all(|line| line.starts_with("ok ")), "{lines:?}");
     assert!(line(&lines, "record").contains("no record yet at"), "{lines:?}");
     assert!(cli::files(folder.path()).is_empty());
+    // The service makes a record of an empty file.
+    std::fs::write(folder.path().join("a.db"), "").unwrap();
+    let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
+    assert_eq!(code, Some(0), "{lines:?}");
 }
 
 #[tokio::test]
@@ -78,23 +106,24 @@ async fn doctor_reports_a_clock_that_was_set_back() {
 }
 
 #[test]
-fn doctor_reports_a_clock_before_the_installation_of_the_program() {
+fn doctor_accepts_a_copy_of_the_program_with_the_time_of_the_original() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("gaitwright");
     std::fs::copy(BINARY, &program).unwrap();
-    let ahead = SystemTime::now() + Duration::from_secs(3600);
+    let ahead = SystemTime::now() + Duration::from_hours(1);
     std::fs::File::options().write(true).open(&program).unwrap().set_modified(ahead).unwrap();
     let report = cli::run(program.to_str().unwrap(), folder.path(), &["doctor", "--listen", "127.0.0.1:0"]);
-    let lines: Vec<String> = String::from_utf8(report.stdout).unwrap().lines().map(str::to_owned).collect();
-    let clock = only_error((report.status.code(), lines));
-    assert!(clock.contains("when the file of this program was written: the clock is wrong"), "{clock}");
+    assert!(report.status.success(), "{report:?}");
 }
 
 #[test]
-fn doctor_refuses_a_database_without_a_name() {
+fn doctor_and_the_service_refuse_a_database_without_a_file_name() {
     let folder = tempfile::tempdir().unwrap();
-    let record = only_error(doctor(folder.path(), &["--database", ""]));
-    assert!(record.contains("The path of the database is empty; it must name a file."), "{record}");
+    for database in ["", "x/", "x/."] {
+        let record = refused_by_both(folder.path(), None, database);
+        assert!(record.contains(&format!("must name a file, but is \"{database}\".")), "{record}");
+    }
+    assert!(cli::files(folder.path()).is_empty());
 }
 
 #[tokio::test]
@@ -181,6 +210,13 @@ fn doctor_tells_the_running_service_from_another_program_at_its_address() {
     let address = other.local_addr().unwrap().to_string();
     let found = only_error(doctor(folder.path(), &["--database", "a.db", "--listen", &address]));
     assert!(found.contains(&format!("Cannot listen on {address}")), "{found}");
+    let in_use = "The database a.db is in use by another Gaitwright process.";
+    let found = only_error(doctor(folder.path(), &["--database", "a.db"]));
+    assert!(found.contains(in_use), "{found}");
+    // The second lock is on the database file itself.
+    std::fs::remove_file(folder.path().join("a.db.lock")).unwrap();
+    let found = only_error(doctor(folder.path(), &["--database", "a.db"]));
+    assert!(found.contains(in_use), "{found}");
 }
 
 #[tokio::test]
@@ -191,13 +227,116 @@ async fn doctor_reports_a_lost_record() {
     assert!(record.contains("There is no record at a.db"), "{record}");
 }
 
-#[cfg(unix)]
 #[test]
-fn doctor_does_not_wait_for_a_pipe_in_place_of_the_record() {
+fn doctor_and_the_service_do_not_wait_for_a_pipe_in_place_of_the_record() {
     let folder = tempfile::tempdir().unwrap();
     assert!(Command::new("mkfifo").arg(folder.path().join("a.db")).status().unwrap().success());
-    let record = only_error(doctor(folder.path(), &["--database", "a.db"]));
-    assert!(record.contains("a.db is not a file"), "{record}");
+    let record = refused_by_both(folder.path(), None, "a.db");
+    assert!(record.contains("it is not a file"), "{record}");
+}
+
+#[tokio::test]
+async fn doctor_and_the_service_refuse_a_record_that_cannot_be_written() {
+    let (folder, database) = filled().await;
+    let file = |ending: &str| folder.path().join(format!("a.db{ending}"));
+    std::fs::File::create(file("-wal")).unwrap();
+    std::fs::File::create(file("-shm")).unwrap();
+    // Root may write every file. Files of root, however, are those of another user for anyone else.
+    let is_root = folder.path().metadata().unwrap().uid() == 0;
+    let user = is_root.then_some(65534);
+    if user.is_some_and(|user| Command::new(BINARY).arg("--version").uid(user).output().is_err()) {
+        return skipped("no other user can run the program");
+    }
+    std::os::unix::fs::chown(folder.path(), user, None).unwrap();
+    let set = |path: &Path, mode| std::fs::set_permissions(path, Permissions::from_mode(mode)).unwrap();
+    for name in cli::files(folder.path()) {
+        set(&folder.path().join(name), 0o666);
+    }
+    for ending in ["", "-wal", "-shm", ".lock"] {
+        set(&file(ending), 0o444);
+        let record = refused_by_both(folder.path(), user, "a.db");
+        let cannot = format!("Cannot open or write a.db{ending}: ");
+        assert!(record.contains(&cannot) && record.contains("denied"), "{record}");
+        set(&file(ending), 0o666);
+    }
+    for ending in ["-wal", "-shm", ".lock", ".access"] {
+        let _ = std::fs::remove_file(file(ending));
+        std::fs::create_dir(file(ending)).unwrap();
+        let record = refused_by_both(folder.path(), None, "a.db");
+        assert!(record.contains(&format!("Cannot open or write a.db{ending}: it is not a file")), "{record}");
+        std::fs::remove_dir(file(ending)).unwrap();
+    }
+    std::fs::hard_link(&database, folder.path().join("second")).unwrap();
+    let record = refused_by_both(folder.path(), None, "a.db");
+    assert!(record.contains("has other hard links"), "{record}");
+    std::fs::remove_file(folder.path().join("second")).unwrap();
+    let (code, lines) = doctor(folder.path(), &["--database", "a.db"]);
+    assert_eq!(code, Some(0), "{lines:?}");
+}
+
+#[tokio::test]
+async fn commands_follow_a_link_to_the_record() {
+    let (folder, database) = filled().await;
+    let elsewhere = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink(&database, elsewhere.path().join("absolute.db")).unwrap();
+    std::os::unix::fs::symlink("absolute.db", elsewhere.path().join("link.db")).unwrap();
+    let link = ["--database", "link.db"];
+    let (code, lines) = doctor(elsewhere.path(), &link);
+    assert_eq!(code, Some(0), "{lines:?}");
+    let record = line(&lines, "record");
+    assert!(record.contains(database.to_str().unwrap()) && record.ends_with("anchors: 1"), "{record}");
+    let verified = cli::run(BINARY, elsewhere.path(), &[&["audit", "verify"], &link[..]].concat());
+    let text = String::from_utf8(verified.stdout).unwrap();
+    assert!(verified.status.success() && text.contains("complete according to anchor"), "{text}");
+    let process = Process::start(BINARY, elsewhere.path(), &["--no-sign-in", "--database", "link.db"], "listening on ");
+    let (code, lines) = doctor(elsewhere.path(), &[&link[..], &["--listen", process.address()]].concat());
+    assert_eq!(code, Some(0), "{lines:?}");
+    drop(process);
+    assert_eq!(cli::files(elsewhere.path()), ["absolute.db", "link.db"]);
+    assert!(folder.path().join("a.db.anchor").exists());
+}
+
+#[tokio::test]
+async fn doctor_and_the_service_accept_a_link_to_a_new_record_and_refuse_a_circle_of_links() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, folder.path().join(name)).unwrap();
+    link("new.db", "link.db");
+    drop(Process::start(BINARY, folder.path(), &["--no-sign-in", "--database", "link.db"], "listening on "));
+    assert!(cli::files(folder.path()).contains(&"new.db.anchor".to_owned()));
+    let (code, lines) = doctor(folder.path(), &["--database", "link.db"]);
+    assert_eq!(code, Some(0), "{lines:?}");
+    link("here.db", "there.db");
+    link("there.db", "here.db");
+    let record = refused_by_both(folder.path(), None, "here.db");
+    assert!(record.contains("Too many levels of symbolic links"), "{record}");
+}
+
+#[tokio::test]
+async fn doctor_names_the_folder_that_has_less_space_than_the_reserve() {
+    let (folder, _) = filled().await;
+    std::fs::create_dir(folder.path().join("full")).unwrap();
+    let unshare = |script: &str| {
+        let mut unshare = cli::command("unshare", folder.path(), &["--user", "--map-root-user", "--mount", "sh", "-c"]);
+        unshare.arg(format!("mount -t tmpfs -o size=64k tmpfs full && {script}"));
+        unshare.env("GAITWRIGHT_RESERVE_MB", "1").output()
+    };
+    if !unshare("true").is_ok_and(|done| done.status.success()) {
+        return skipped("no disk can be mounted here");
+    }
+    for (flag, value) in [("--backup-folder", "full"), ("--anchor", "full/anchor")] {
+        let flags = format!("--listen 127.0.0.1:0 --database a.db {flag} {value}");
+        let output = unshare(&format!("{BINARY} doctor {flags}")).unwrap();
+        let disk = only_error((output.status.code(), lines_of(&output)));
+        assert!(disk.contains("free in the folder full, less than the reserve of 1 MB"), "{disk}");
+    }
+}
+
+#[test]
+fn doctor_reports_an_invalid_reserve_once() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("gaitwright.toml"), "reserve_mb = \"much\"\n").unwrap();
+    let settings = only_error(doctor(folder.path(), &[]));
+    assert!(settings.contains("settings") && settings.contains("reserve_mb"), "{settings}");
 }
 
 #[tokio::test]

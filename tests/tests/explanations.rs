@@ -15,8 +15,8 @@ use gaitwright_tests::cli;
 use gaitwright_tests::described::audit_trail;
 use gaitwright_tests::explained::{Clearance, with_few_gaits, without_gaits};
 use gaitwright_tests::service::{Answer, Service};
-use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
+use skipped_tests::long_tests_are_skipped;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -369,8 +369,7 @@ async fn relaxation_outside_the_search_space_is_refused_with_the_reason() {
 /// The service and the command line give the same explanation, in the same words.
 #[tokio::test]
 async fn service_and_command_line_give_the_same_explanation() {
-    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        skipped("set GAITWRIGHT_LONG_TESTS=1");
+    if long_tests_are_skipped("") {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

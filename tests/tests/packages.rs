@@ -3,7 +3,7 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::skipped;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -103,6 +103,32 @@ fn tarball_has_the_program_its_own_readme_the_licences_and_the_examples() {
         assert_eq!(std::fs::read(unpacked.join(licence)).unwrap(), of_repository(licence));
     }
     assert_examples(&unpacked.join("examples"));
+}
+
+#[test]
+fn upgrade_of_the_debian_package_restarts_a_running_service() {
+    let folder = tempfile::tempdir().unwrap();
+    if packages(folder.path()).is_none() {
+        return;
+    }
+    let control = folder.path().join("control");
+    let Ok(output) = Command::new("dpkg-deb").arg("-e").arg(with_ending(folder.path(), ".deb")).arg(&control).output()
+    else {
+        return skipped("there is no dpkg-deb");
+    };
+    assert!(output.status.success(), "{output:?}");
+    // A `systemctl` that only prints its arguments, on a machine that need not run systemd.
+    let script = std::fs::read_to_string(control.join("postinst")).unwrap();
+    assert!(script.contains("/run/systemd/system"), "{script}");
+    let script = script.replace("/run/systemd/system", "/");
+    let configure = |old_version: &[&str]| {
+        let script = format!("systemctl() {{ echo \"$@\"; }}\n{script}");
+        let output = run(Command::new("sh").args(["-c", &script, "postinst", "configure"]).args(old_version));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    assert_eq!(configure(&["0.0.1"]), "daemon-reload\ntry-restart gaitwright\n");
+    // dpkg passes an empty version at the first installation.
+    assert_eq!((configure(&[]), configure(&[""])), ("daemon-reload\n".to_owned(), "daemon-reload\n".to_owned()));
 }
 
 #[test]

@@ -17,8 +17,8 @@ use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trial
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
-use gaitwright_tests::skipped::skipped;
 use serde_json::{Value, json};
+use skipped_tests::long_tests_are_skipped;
 use std::collections::HashSet;
 use std::path::Path;
 use std::process::{Output, Stdio};
@@ -483,8 +483,7 @@ fn broker_delivers_a_result_with_muscles() {
 
 #[test]
 fn long_solve_of_a_gait_with_muscles_converges() {
-    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        skipped("set GAITWRIGHT_LONG_TESTS=1");
+    if long_tests_are_skipped("") {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -8,7 +8,7 @@ use gaitwright_store::{commit, reference_gaits};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::long_tests_are_skipped;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
@@ -96,8 +96,7 @@ async fn report_has_a_deviation_band_or_states_that_it_has_none() {
 
 #[test]
 fn short_comparison_writes_a_self_contained_report() {
-    if std::env::var_os("GAITWRIGHT_LONG_TESTS").is_none() {
-        skipped("set GAITWRIGHT_LONG_TESTS=1");
+    if long_tests_are_skipped("") {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -9,7 +9,7 @@ use gaitwright_store::{Store, commit};
 use gaitwright_tests::cli::run;
 use gaitwright_tests::client::{get, send};
 use gaitwright_tests::serve_process::Process;
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::skipped;
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;

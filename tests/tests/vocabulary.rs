@@ -76,7 +76,7 @@ fn texts() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let listed = Command::new("git").args(["ls-files", "-z"]).current_dir(&root).output();
     let Some(listed) = listed.ok().filter(|listed| listed.status.success()) else {
-        gaitwright_tests::skipped::skipped("git is missing, or this is no clone");
+        skipped_tests::skipped("git is missing, or this is no clone");
         return Vec::new();
     };
     let paths = String::from_utf8(listed.stdout).unwrap();

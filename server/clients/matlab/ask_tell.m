@@ -13,7 +13,7 @@ subjects = request(address, token, 'GET', '/subjects?limit=1000');
 % Objects with the same fields are a struct array, others a cell array.
 subject = subjects.items(strcmp({subjects.items.pseudonym}, 'paper-1'));
 study = request(address, token, 'POST', '/studies', struct( ...
-    'subject_id', subject.id, 'name', 'treadmill', 'evaluation', 'script', 'number_of_trials', 10));
+    'subject_id', subject.id, 'evaluation', 'script', 'number_of_trials', 10));
 for k = 1:study.number_of_trials
     trial = request(address, token, 'POST', ['/studies/' study.id '/ask'], struct('script', 'treadmill'));
     rmse = measure(trial.action);

@@ -22,7 +22,7 @@ def measure(action: Bounds) -> Optional[float]:
 def main() -> None:
     client = Client(sys.argv[1] if len(sys.argv) > 1 else "http://127.0.0.1:8080", *sys.argv[2:3])
     subject = next(subject for subject in client.list_subjects() if subject["pseudonym"] == "paper-1")
-    study = client.create_study(subject_id=subject["id"], name="treadmill", evaluation="script", number_of_trials=10)
+    study = client.create_study(subject_id=subject["id"], evaluation="script", number_of_trials=10)
     while True:
         try:
             trial = client.ask_for_trial(study["id"], script="treadmill")

@@ -20,10 +20,14 @@ Description: tuning of walking gaits for powered prostheses
  proposes bounds, an optimiser computes gaits within them, and people or Gait
  RMSE compare the gaits.
 """
-# The administrator starts the service after editing the settings.
+# The administrator starts the service after editing the settings. An upgrade, whose second argument is the old version,
+# restarts a running service.
 POSTINST = """#!/bin/sh
 set -e
-if [ -d /run/systemd/system ]; then systemctl daemon-reload; fi
+if [ -d /run/systemd/system ]; then
+    systemctl daemon-reload
+    if [ -n "$2" ]; then systemctl try-restart gaitwright || true; fi
+fi
 """
 PRERM = """#!/bin/sh
 set -e

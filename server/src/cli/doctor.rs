@@ -8,12 +8,18 @@ use gaitwright_service::error::Error;
 #[cfg(feature = "nats")]
 use gaitwright_service::workers::nats;
 use gaitwright_store::backup_folder::BackupFolder;
-use gaitwright_store::{Instant, SCHEMA_VERSION, access_clock, check_path, free_bytes, is_open_elsewhere, now, verify};
+use gaitwright_store::{
+    Instant, SCHEMA_VERSION, StoreError, access_clock, check_path, free_bytes, is_open_elsewhere, now, verify,
+};
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, Ipv6Addr, TcpStream};
+#[cfg(unix)]
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::thread::available_parallelism;
 use std::time::Duration;
+#[cfg(unix)]
+use std::time::UNIX_EPOCH;
 
 /// How far the record may be ahead of the clock without notice, s: the clocks of machines that write to it differ.
 const CLOCKS_DIFFER_S: i64 = 5;
@@ -57,13 +63,10 @@ impl DoctorCommand {
             ("tls", tls(&plan).await),
             ("address", address(&plan, &database)),
             ("folders", folders(settings, &plan)),
-            (
-                "disk",
-                settings.reserve_bytes().map_or_else(|e| Trouble(e.to_string()), |reserve| disk(&database, reserve)),
-            ),
+            ("disk", disk(settings, &plan)),
         ];
         checks.push(("record", record(&database, settings.anchor().as_deref()).await));
-        checks.push(("clock", clock(&database).await));
+        checks.push(("clock", clock(&database, now()).await));
         checks.push(("broker", broker(settings).await));
         for (what, found) in &checks {
             let (state, text) = match found {
@@ -83,28 +86,39 @@ fn program() -> CheckOutcome {
     Good(format!("gaitwright {version}, schema {SCHEMA_VERSION}, {os} {architecture}, processors: {processors}"))
 }
 
-fn disk(database: &Path, reserve: u64) -> CheckOutcome {
-    let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 / 1e9);
-    match free_bytes(folder_of(database)) {
-        _ if !folder_of(database).is_dir() => Skipped("needs the folder of the record"),
-        Some(free) if free < reserve => {
-            Trouble(format!("{} free, less than the reserve of {}", gigabytes(free), gigabytes(reserve)))
-        }
-        Some(free) => Good(format!("{} free, reserve {}", gigabytes(free), gigabytes(reserve))),
+/// Whether every folder to which the service writes has more free space than the reserve.
+fn disk(settings: &Settings, plan: &Result<ServicePlan, Error>) -> CheckOutcome {
+    let Ok(plan) = plan else { return Skipped(VALID_SETTINGS) };
+    if !folder_of(&settings.database()).is_dir() {
+        return Skipped("needs the folder of the record");
+    }
+    let reserve = megabytes(plan.reserve_bytes);
+    let least =
+        written_folders(settings, plan).into_iter().filter_map(|folder| Some((free_bytes(&folder)?, folder))).min();
+    match least {
+        Some((free, folder)) if free < plan.reserve_bytes => Trouble(format!(
+            "{} free in the folder {}, less than the reserve of {reserve}",
+            megabytes(free),
+            folder.display()
+        )),
+        Some((free, _)) => Good(format!("{} free, reserve {reserve}", megabytes(free))),
         None => Good("this system does not report free space".to_owned()),
     }
 }
 
-/// Whether the record, if there is one, is intact, and not lost otherwise.
+/// The unit of the setting `reserve_mb`.
+fn megabytes(bytes: u64) -> String {
+    format!("{} MB", bytes / 1_000_000)
+}
+
+/// Whether the record, if there is one, is intact and the service can open it; otherwise, whether it was lost.
 async fn record(database: &Path, second_anchor: Option<&Path>) -> CheckOutcome {
-    let is_there = std::fs::symlink_metadata(database).is_ok();
-    if is_there && !database.is_file() {
-        return Trouble(format!("{} is not a file", database.display()));
+    if let Err(error) = check_path(database, second_anchor) {
+        return Trouble(error.to_string());
     }
-    match check_path(database, second_anchor) {
-        Err(error) => return Trouble(error.to_string()),
-        Ok(()) if !is_there => return Good(format!("no record yet at {}", database.display())),
-        Ok(()) => {}
+    // The service makes a record of an empty file.
+    if !database.metadata().is_ok_and(|file| file.len() > 0) {
+        return Good(format!("no record yet at {}", database.display()));
     }
     // The service makes a second anchor that is missing.
     let anchors = second_anchor.filter(|anchor| anchor.exists()).map(Path::to_owned);
@@ -121,11 +135,11 @@ async fn record(database: &Path, second_anchor: Option<&Path>) -> CheckOutcome {
 }
 
 /// A clock that is behind the program's own file, or behind the record, was set back or never set.
-async fn clock(database: &Path) -> CheckOutcome {
-    let present = now();
-    if let Some(program) = program_written().filter(|&written| behind(present, written)) {
+async fn clock(database: &Path, present: Instant) -> CheckOutcome {
+    let program = std::env::current_exe().ok().and_then(|program| came_to_this_machine(&program));
+    if let Some(program) = program.filter(|&program| behind(present, program)) {
         return Trouble(format!(
-            "{present} is earlier than {program}, when the file of this program was written: the clock is wrong"
+            "{present} is earlier than {program}, when the file of this program was last changed: the clock is wrong"
         ));
     }
     if !database.is_file() {
@@ -145,9 +159,15 @@ fn behind(present: Instant, recorded: Instant) -> bool {
     recorded > present.plus_seconds(CLOCKS_DIFFER_S)
 }
 
-/// When the file of this program was written, if the system says so.
-fn program_written() -> Option<Instant> {
-    Instant::of_file(std::env::current_exe().ok()?.metadata().ok()?.modified().ok()?)
+/// When this machine created the file or last changed it, if the system says so. The time of its content is not used:
+/// packages and copies set it to any value.
+fn came_to_this_machine(file: &Path) -> Option<Instant> {
+    let file = file.metadata().ok()?;
+    #[cfg(unix)]
+    let time = UNIX_EPOCH.checked_add(Duration::from_secs(u64::try_from(file.ctime()).ok()?))?;
+    #[cfg(not(unix))]
+    let time = file.created().ok()?;
+    Instant::of_file(time)
 }
 
 /// Whether the settings are readable, within their ranges and consistent.
@@ -175,10 +195,14 @@ async fn tls(plan: &Result<ServicePlan, Error>) -> CheckOutcome {
     }
 }
 
-/// Whether the service can listen on its address, or the running service does.
+/// Whether the service can listen on its address, or the running service does. A process that owns the record and does not
+/// listen there prevents the service from starting.
 fn address(plan: &Result<ServicePlan, Error>, database: &Path) -> CheckOutcome {
     match plan.as_ref().map(|plan| (plan.listen, plan.listener())) {
         Err(_) => Skipped(VALID_SETTINGS),
+        Ok((_, Ok(_))) if is_open_elsewhere(database) => {
+            Trouble(StoreError::InUse { path: database.to_owned() }.to_string())
+        }
         Ok((listen, Ok(_))) => Good(format!("{listen} is free")),
         Ok((listen, Err(_))) if is_open_elsewhere(database) && answers(plan) => {
             Good(format!("the service is running on {listen}"))
@@ -206,14 +230,20 @@ fn answers(plan: &Result<ServicePlan, Error>) -> bool {
         || health().is_ok_and(|answer| answer.contains(r#""status":"#) && answer.contains(r#""version":"#))
 }
 
-/// Whether the service can write to the folders of the record, the second anchor and the backups.
-fn folders(settings: &Settings, plan: &Result<ServicePlan, Error>) -> CheckOutcome {
-    let Ok(plan) = plan else { return Skipped(VALID_SETTINGS) };
+/// The folders of the record, the second anchor and the backups.
+fn written_folders(settings: &Settings, plan: &ServicePlan) -> Vec<PathBuf> {
     // The check of the record reports a missing folder of the anchor.
     let of_anchor = settings.anchor().filter(|anchor| folder_of(anchor).is_dir());
     let files = [Some(settings.database()), of_anchor].into_iter().flatten();
-    let mut wanted: Vec<PathBuf> = files.map(|file| folder_of(&file).to_owned()).collect();
-    wanted.extend(plan.backups.as_ref().map(|backups| backups.folder.clone()));
+    let mut folders: Vec<PathBuf> = files.map(|file| folder_of(&file).to_owned()).collect();
+    folders.extend(plan.backups.as_ref().map(|backups| backups.folder.clone()));
+    folders
+}
+
+/// Whether the service can write to its folders.
+fn folders(settings: &Settings, plan: &Result<ServicePlan, Error>) -> CheckOutcome {
+    let Ok(plan) = plan else { return Skipped(VALID_SETTINGS) };
+    let wanted = written_folders(settings, plan);
     let refused = wanted.iter().find_map(|folder| Some((folder, tempfile::tempfile_in(folder).err()?)));
     let claimed = match refused {
         Some((folder, error)) => {
@@ -242,5 +272,19 @@ async fn broker(settings: &Settings) -> CheckOutcome {
         // A program without NATS refuses a broker in the settings.
         Ok(_) => Good("no NATS broker is set".to_owned()),
         Err(error) => Trouble(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn clock_before_the_installation_of_the_program_is_reported() {
+        let no_record = Path::new("no such record");
+        let long_ago = "2001-01-01T00:00:00.000Z".parse().unwrap();
+        let Trouble(text) = clock(no_record, long_ago).await else { panic!("the clock was accepted") };
+        assert!(text.contains("when the file of this program was last changed: the clock is wrong"), "{text}");
+        assert!(matches!(clock(no_record, now()).await, Good(_)));
     }
 }

@@ -21,9 +21,12 @@ pub enum StoreError {
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The name of the file is empty.
-    #[error("The path of the database is empty; it must name a file.")]
-    NoFileName,
+    /// The path does not end with the name of a file.
+    #[error("The path of the database must name a file, but is \"{}\".", path.display())]
+    NoFileName {
+        /// The path.
+        path: PathBuf,
+    },
     /// The file is not a database of this program.
     #[error("{} is not a Gaitwright database: {reason}.", path.display())]
     NotADatabase {
@@ -327,7 +330,7 @@ impl StoreError {
         matches!(
             self,
             Self::Open { .. }
-                | Self::NoFileName
+                | Self::NoFileName { .. }
                 | Self::NotADatabase { .. }
                 | Self::NewerSchema { .. }
                 | Self::DevelopmentSchema { .. }

@@ -171,7 +171,8 @@ impl Store {
     /// [`Store::open`] with a second anchor, best on another disk.
     ///
     /// # Errors
-    /// [`StoreError::NoFileName`], [`StoreError::NotADatabase`], [`StoreError::InUse`] if another process owns the file,
+    /// [`StoreError::NoFileName`], [`StoreError::NotADatabase`], [`StoreError::SeveralNames`], [`StoreError::Open`] if a file of
+    /// the record cannot be written, [`StoreError::InUse`] if another process owns the file,
     /// [`StoreError::NewerSchema`], [`StoreError::DevelopmentSchema`], [`StoreError::WrongAnchor`],
     /// [`StoreError::RecordMissing`], [`StoreError::CutOff`] and [`StoreError::Rewritten`]
     /// if the record contradicts an anchor, [`StoreError::Unsealed`] and [`StoreError::Damaged`] if another program
@@ -183,6 +184,7 @@ impl Store {
         let mut record_lock = RecordLock::take(path)?;
         let checked = async {
             interrupted_restore::finish_interrupted(path)?;
+            opening_checks::refuse_unwritable_companions(path)?;
             refuse_unchanged(path).await?;
             refuse_empty_in_place_of_record(path, &anchors)?;
             record_lock.make_database(path)

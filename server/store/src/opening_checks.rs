@@ -3,7 +3,7 @@
 
 use super::record_file_names::path_with_suffix;
 use super::schema_versions::SchemaFile;
-use super::{StoreError, StoreResult, anchor, migrations, schema_versions, sqlite_file, verify};
+use super::{StoreError, StoreResult, anchor, migrations, record_lock, schema_versions, sqlite_file, verify};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqlitePoolOptions};
 use std::path::{Path, PathBuf};
@@ -32,12 +32,21 @@ pub(super) async fn refuse_unchanged(path: &Path) -> StoreResult<()> {
 /// Checks a path that may have no record yet, as opening it does, and creates nothing.
 ///
 /// # Errors
-/// [`StoreError::WrongAnchor`], [`StoreError::NoAnchorFolder`], [`StoreError::NoFileName`], [`StoreError::NotADatabase`] and
-/// [`StoreError::RecordMissing`], as [`super::Store::open_anchored`].
+/// [`StoreError::WrongAnchor`], [`StoreError::NoAnchorFolder`], [`StoreError::NoFileName`], [`StoreError::NotADatabase`],
+/// [`StoreError::SeveralNames`], [`StoreError::Open`] and [`StoreError::RecordMissing`], as [`super::Store::open_anchored`].
 pub fn check_path(path: &Path, second_anchor: Option<&Path>) -> StoreResult<()> {
     anchor::refuse_wrong(second_anchor, path, None)?;
     sqlite_file::check(path)?;
+    record_lock::check(path)?;
+    refuse_unwritable_companions(path)?;
     refuse_empty_in_place_of_record(path, &anchors(path, second_anchor))
+}
+
+/// Refuses files beside the record that its owner could not write. An owner checks them behind its lock, because closing one
+/// of SQLite's files releases the locks of another connection of the same process.
+pub(super) fn refuse_unwritable_companions(path: &Path) -> StoreResult<()> {
+    let companions = ["-wal", "-shm", ".access"];
+    companions.into_iter().try_for_each(|ending| record_lock::refuse_unwritable(&path_with_suffix(path, ending)))
 }
 
 /// The anchors of a record.

@@ -5,7 +5,9 @@ use super::atomic_file::private;
 use super::error::{StoreError, StoreResult};
 use super::lost_files::FileId;
 use super::record_file_names::path_with_suffix;
-use std::fs::{File, TryLockError};
+use std::ffi::OsStr;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// The locks of an open record.
@@ -22,12 +24,11 @@ pub(super) struct RecordLock {
 impl RecordLock {
     /// Takes ownership of an existing or future record.
     pub(super) fn take(path: &Path) -> StoreResult<Self> {
-        refuse_second_name(path)?;
-        // Resolve links, so that each file has one lock.
-        let lock = path_with_suffix(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
+        check(path)?;
+        let lock = lock_of(path);
         let made = !lock.exists();
         let open = private().create(true).truncate(false).write(true).open(&lock);
-        let file = open.map_err(|source| StoreError::Open { path: path.to_owned(), source })?;
+        let file = open.map_err(|source| StoreError::Open { path: lock.clone(), source })?;
         locked(path, &file)?;
         let database = if path.exists() { Some(lock_database(path, false)?) } else { None };
         Ok(Self { lock, made, _lock_file: file, database })
@@ -49,10 +50,41 @@ impl RecordLock {
     }
 }
 
-/// Whether a process owns the record. Creates nothing.
+fn lock_of(path: &Path) -> PathBuf {
+    path_with_suffix(path, ".lock")
+}
+
+/// Whether another process owns the record. Creates nothing.
 pub fn is_open_elsewhere(path: &Path) -> bool {
-    let lock = path_with_suffix(&path.canonicalize().unwrap_or_else(|_| path.to_owned()), ".lock");
-    File::open(lock).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    let is_locked = |file: &Path| {
+        // Opening a pipe would wait for its other end.
+        file.is_file()
+            && File::open(file).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    };
+    is_locked(&lock_of(path)) || (cfg!(unix) && is_locked(path))
+}
+
+/// Refuses a path of which no process can take ownership. Creates nothing.
+pub(super) fn check(path: &Path) -> StoreResult<()> {
+    // `folder/` has a file name for the standard library.
+    let ends_with_its_name = |name: &OsStr| path.as_os_str().as_encoded_bytes().ends_with(name.as_encoded_bytes());
+    if !path.file_name().is_some_and(ends_with_its_name) {
+        return Err(StoreError::NoFileName { path: path.to_owned() });
+    }
+    refuse_second_name(path)?;
+    refuse_unwritable(path)?;
+    refuse_unwritable(&lock_of(path))
+}
+
+/// Refuses anything at this path but a file that this process can write. Accepts that there is nothing.
+pub(super) fn refuse_unwritable(path: &Path) -> StoreResult<()> {
+    let opened = match std::fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Ok(found) if !found.is_file() => Err(std::io::Error::other("it is not a file")),
+        Ok(_) => OpenOptions::new().write(true).open(path).map(drop),
+        Err(error) => Err(error),
+    };
+    opened.map_err(|source| StoreError::Open { path: path.to_owned(), source })
 }
 
 /// Refuses a file with hard links, because SQLite's log and our lock file would exist once for each name.

@@ -34,16 +34,14 @@ pub(super) fn named(path: &Path, error: StoreError) -> StoreError {
 pub(super) fn check(path: &Path) -> StoreResult<()> {
     let cannot_open = |source| StoreError::Open { path: path.to_owned(), source };
     let no_database = |reason: &str| Err(StoreError::NotADatabase { path: path.to_owned(), reason: reason.to_owned() });
-    if path.as_os_str().is_empty() {
-        return Err(StoreError::NoFileName);
+    match std::fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Ok(found) if found.is_dir() => return no_database("it is a folder"),
+        // Reading a pipe would wait for its other end.
+        Ok(found) if !found.is_file() => return no_database("it is not a file"),
+        _ => {}
     }
-    if path.is_dir() {
-        return no_database("it is a folder");
-    }
-    let file = match File::open(path) {
-        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
-        other => other.map_err(cannot_open)?,
-    };
+    let file = File::open(path).map_err(cannot_open)?;
     let mut start = Vec::with_capacity(HEADER.len());
     file.take(HEADER.len() as u64).read_to_end(&mut start).map_err(cannot_open)?;
     if start.is_empty() || start == HEADER { Ok(()) } else { no_database("it does not start with the SQLite header") }

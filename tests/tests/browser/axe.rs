@@ -1,7 +1,7 @@
 //! Accessibility checks with axe-core.
 
 use crate::chromium::Tab;
-use gaitwright_tests::skipped::skipped_unless_required;
+use skipped_tests::skipped_unless_required;
 use std::path::{Path, PathBuf};
 
 /// The script of axe-core. Its licence prevents including it here, so `.ci/run` downloads it.

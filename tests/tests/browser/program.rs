@@ -1,7 +1,7 @@
 //! The program itself behind the pages, with the real optimiser: from an empty folder to a recommended gait.
 
 use crate::chromium::Chromium;
-use gaitwright_tests::skipped::skipped;
+use skipped_tests::skipped;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};

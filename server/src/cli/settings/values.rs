@@ -12,14 +12,25 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
+/// Number of symbolic links that Linux follows.
+const LONGEST_CHAIN_OF_LINKS: u32 = 40;
+
 impl Settings {
     pub(in crate::cli) fn listen(&self) -> Result<SocketAddr, Error> {
         self.parsed("listen", "an address and a port such as 127.0.0.1:8080")
     }
 
-    /// The SQLite file of the record.
+    /// The SQLite file of the record. A symbolic link is followed, because the other files of the record are beside the file
+    /// itself.
     pub(in crate::cli) fn database(&self) -> PathBuf {
-        PathBuf::from(self.text("database"))
+        let mut path = PathBuf::from(self.text("database"));
+        // In a circle of links, the path remains a link that cannot be opened.
+        for _ in 0..LONGEST_CHAIN_OF_LINKS {
+            let Ok(target) = path.read_link() else { break };
+            path.pop();
+            path.push(target);
+        }
+        path
     }
 
     /// The second anchor file.
