@@ -81,6 +81,7 @@ mod tests {
     use gait_learner::ActionIndex;
     use gait_optimizer::{GaitSettings, SolveOptions, Subject, TunedBounds};
     use gaitwright_compute::Pool;
+    use std::collections::BTreeSet;
 
     /// The solve of the default bounds, and a map with the gaits of these actions.
     fn atlas(settings: GaitSettings, actions: &[u64]) -> (Family, GaitMap) {
@@ -111,8 +112,9 @@ mod tests {
     #[test]
     fn best_gait_is_the_certified_one_with_the_lowest_gait_rmse() {
         let (family, map) = atlas(GaitSettings::default(), &[0, 4000, 8000, 11_000]);
-        let mut table = Vec::new();
-        for row in map.rows().filter(|row| row.number.is_some()) {
+        let (mut table, mut numbers) = (Vec::new(), BTreeSet::new());
+        // Each gait is that of many actions.
+        for row in map.rows().filter(|row| row.number.is_some_and(|number| numbers.insert(number))) {
             let bounds = map.bounds_of(family.problem.bounds, row.solved.action).unwrap();
             let problem = GaitProblem { bounds, ..family.problem.clone() };
             let options = &family.options;
@@ -121,7 +123,6 @@ mod tests {
             table.push((outcome.report.gait_rmse_rad, row.number.unwrap(), passed));
         }
         table.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        table.dedup_by_key(|gait| gait.1);
         assert!(table.len() > 2, "{table:?}");
         let place = table.iter().position(|(_, _, passed)| *passed).unwrap();
         let BestCertifiedGaitSearch::Found { best, failed } = found(family, map) else { panic!("{table:?}") };
