@@ -330,7 +330,7 @@ mod tests {
             (r#"{"a": [1]}"#.to_owned(), "invalid type: sequence"),
             (r#"{"a": true}"#.to_owned(), "invalid type: boolean"),
             (r#"{"a": {"b": 1}}"#.to_owned(), "invalid type: integer"),
-            (r#"{"a": {"b": "00"}}"#.to_owned(), "is not a binary value"),
+            (r#"{"a": {"b": "00"}}"#.to_owned(), "must be a binary value"),
             (r#"{"a": {"hexadecimal": "0"}}"#.to_owned(), "not hexadecimal"),
             (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "other fields besides its binary value"),
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
