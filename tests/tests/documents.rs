@@ -80,7 +80,10 @@ async fn served_documents_have_exactly_the_described_properties() {
         "gait_settings": {"naturalness": {"reference_weight": 1, "trailing_load_share": 0.1}},
         "solve_options": {"solver": solver, "time_limit_s": 60, "local_optimum_choice": nearest},
     });
-    for study in [with_muscles, json!({"subject_id": subject, "number_of_trials": 2, "muscles": false})] {
+    let numbered = json!({"local_optimum_choice": {"numbered": {"number": 1}}});
+    let without_muscles =
+        json!({"subject_id": subject, "number_of_trials": 2, "muscles": false, "solve_options": numbered});
+    for study in [with_muscles, without_muscles] {
         let made = service.post("/api/v1/studies", &study).await;
         assert!(made.status.is_success(), "{}", made.text);
         let id = made.json()["id"].as_str().unwrap().parse().unwrap();
