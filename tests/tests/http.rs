@@ -250,7 +250,7 @@ async fn preferences_are_created_read_and_retracted() {
 
     let retract = format!("/api/v1/preferences/{}/retract", row["id"].as_str().unwrap());
     let without = service.post(&retract, &json!({"reason": " "})).await;
-    is_problem(&without, unprocessable, "/problems/invalid-field", "say why the answer is retracted");
+    is_problem(&without, unprocessable, "/problems/invalid-field", "say why the preference is retracted");
     let done = service.post(&retract, &json!({"reason": "wrong button", "author": "Dr K"})).await.json();
     assert_eq!(done["retraction"]["reason"], "wrong button");
     let again = service.post(&retract, &json!({"reason": "wrong button"})).await;
