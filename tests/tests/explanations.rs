@@ -93,7 +93,10 @@ async fn ended_study_explains_every_trial_without_a_gait_in_order() {
     let coming = service.fetch(&format!("/api/v1/jobs/explanation-{}", last.id)).await;
     assert_eq!(coming.json()["state"], "queued", "{}", coming.text);
     let page = service.fetch(&format!("/trials/{}", last.id)).await.text;
-    assert!(page.contains("The service will explain this trial automatically") && page.contains("/explain\""), "{page}");
+    assert!(
+        page.contains("The service will explain this trial automatically") && page.contains("/explain\""),
+        "{page}"
+    );
 
     let found = explained(&service, last.id).await;
     let expected: Vec<String> = trials.iter().map(|trial| format!("trial {}", trial.id)).collect();

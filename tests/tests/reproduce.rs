@@ -73,6 +73,13 @@ async fn report_has_a_deviation_band_or_states_that_it_has_none() {
                 .study(|new| (new.number_of_trials, new.muscles, new.reference_gait_id) = (3, muscles, id))
                 .await;
             service.wait_for(study, &[StudyState::Finished]).await;
+            let recommended = format!("/api/v1/studies/{study}/recommendation");
+            for _ in 0..500 {
+                if service.fetch(&recommended).await.json()["certificate"] == "passed" {
+                    break;
+                }
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
         }
         service.stop().await;
         let arguments = ["reproduce", "--subject", "1", "--trials", "3", "--seeds", "1", "--folder", out];

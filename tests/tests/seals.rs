@@ -50,6 +50,7 @@ async fn audit_verify_finds_rows_that_another_program_changed_added_or_deleted()
         let written = match table {
             "attempts" => "received_at",
             "explanations" => "program",
+            "other_local_optima" => "gait_sha256",
             "safety_review_reports" => "report_id",
             _ => "created_at",
         };

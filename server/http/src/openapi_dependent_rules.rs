@@ -41,16 +41,16 @@ const RULES: [(&str, &str, &str); 33] = [
     ("NewPreference", "author", AUTHOR),
     ("NewAssessment", "author", AUTHOR),
     ("NewSafetyReport", "author", AUTHOR),
-    ("Suggestion", "author", AUTHOR),
+    ("NewSuggestion", "author", AUTHOR),
     ("NewPreference", "trial_a", GAIT),
     ("NewPreference", "trial_b", GAIT),
     ("NewAssessment", "trial_a", GAIT_OF_STUDY),
     ("NewAssessment", "trial_b", GAIT_OF_STUDY),
     ("NewLabSession", "trial_a", GAIT),
     ("NewLabSession", "trial_b", GAIT),
-    ("Suggestion", "over", "A trial of this study with a walkable gait."),
+    ("NewSuggestion", "over", "A trial of this study with a walkable gait."),
     (
-        "Suggestion",
+        "NewSuggestion",
         "bounds",
         "Dimensions of the study's search space, each with one of its values. At least one value differs from \
          that of the trial. If another trial already has these bounds, its gait is walkable and differs from \

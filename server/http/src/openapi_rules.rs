@@ -38,7 +38,7 @@ const NAMES: [(&str, &str, u32); 13] = [
     ("NewPreference", "author", 80),
     ("NewAssessment", "author", 80),
     ("NewSafetyReport", "author", 80),
-    ("Suggestion", "author", 80),
+    ("NewSuggestion", "author", 80),
     ("AnswerUndo", "author", 80),
 ];
 
@@ -83,7 +83,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             "NewPreference",
             "NewAssessment",
             "NewSafetyReport",
-            "Suggestion",
+            "NewSuggestion",
             "RaterAnswer",
             "NewLabAnswer",
             "RecordedWalk",
@@ -128,7 +128,7 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         schemas.add("JointAngleReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });
-        schemas.add("Suggestion", "bounds", &bounds);
+        schemas.add("NewSuggestion", "bounds", &bounds);
         for (field, (least, most)) in
             [("height_m", Subject::HEIGHT_RANGE_M), ("body_mass_kg", Subject::BODY_MASS_RANGE_KG)]
         {
