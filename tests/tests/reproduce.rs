@@ -9,6 +9,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
 use skipped_tests::long_tests_are_skipped;
+use std::time::Duration;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gaitwright-cli");
 
