@@ -71,7 +71,10 @@ async fn report_has_a_deviation_band_or_states_that_it_has_none() {
         }
         for muscles in [false, true] {
             let study = service
-                .study(|new| (new.number_of_trials, new.muscles, new.reference_gait_id) = (3, muscles, id))
+                .study(|new| {
+                    (new.number_of_trials, new.muscles, new.reference_gait_id) = (3, muscles, id);
+                    new.repeat_results = Some(true);
+                })
                 .await;
             service.wait_for(study, &[StudyState::Finished]).await;
             let recommended = format!("/api/v1/studies/{study}/recommendation");
