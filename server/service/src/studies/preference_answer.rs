@@ -182,7 +182,7 @@ pub(super) async fn retract_entry(
     let author = printable::name("author", author.unwrap_or(&caller.name), 80)?;
     let reason = printable::reason("reason", reason, &format!(" and say why the {kind} is retracted"))?;
     if !feedback::retract(writer, row, author, reason).await? {
-        return Err(Error::conflict(&format!("This {kind} was already retracted.")));
+        return Err(Error::conflict(format!("This {kind} was already retracted.")));
     }
     events::append(writer, row.study_id, "feedback_retracted", &json!({ "feedback_id": row.id })).await?;
     let detail = json!({ "study": row.study_id, "author": author, "reason": reason });
