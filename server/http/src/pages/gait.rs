@@ -149,7 +149,7 @@ pub(super) async fn get(
     Visible(id, _): Visible<TrialId, Read>,
     Params(shown): Params<GaitQuery>,
 ) -> PageResult {
-    show(&mut app, authorized.caller, id, shown, GaitForms::default()).await
+    Box::pin(show(&mut app, authorized.caller, id, shown, GaitForms::default())).await
 }
 
 /// Shows the page again with a refused form.
@@ -160,7 +160,7 @@ pub(super) async fn refuse(
     forms: GaitForms,
 ) -> Result<Response, PageError> {
     let status = forms.refused.status();
-    Ok((status, show(app, caller, id, GaitQuery::default(), forms).await?).into_response())
+    Ok((status, Box::pin(show(app, caller, id, GaitQuery::default(), forms)).await?).into_response())
 }
 
 async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery, mut forms: GaitForms) -> PageResult {

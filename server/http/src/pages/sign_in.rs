@@ -276,15 +276,12 @@ pub(super) async fn set_password(
     if shown.must_confirm_password {
         // Wrong passwords count as failed sign-ins.
         let right = compare(&app, &visit, &user.name, Some(&user), form.present).await?.map_err(too_many)?;
-        match right {
-            Some((mut writer, attempt)) => {
-                attempt.succeeded(&mut writer).await?;
-                commit(writer).await?;
-            }
-            None => {
-                let wrong = FieldError::in_words("present", "The current password is wrong.");
-                check.refuse(Error::Invalid(Box::new(wrong)))?;
-            }
+        if let Some((mut writer, attempt)) = right {
+            attempt.succeeded(&mut writer).await?;
+            commit(writer).await?;
+        } else {
+            let wrong = FieldError::in_words("present", "The current password is wrong.");
+            check.refuse(Error::Invalid(Box::new(wrong)))?;
         }
     }
     let name = user.name.clone();

@@ -84,9 +84,9 @@ mod tests {
     use std::collections::BTreeSet;
 
     /// The solve of the default bounds, and a map with the gaits of these actions.
-    fn atlas(settings: GaitSettings, actions: &[u64]) -> (Family, GaitMap) {
+    fn atlas(settings: &GaitSettings, actions: &[u64]) -> (Family, GaitMap) {
         let mut problem = GaitProblem::new(Subject::builtin(1).unwrap(), false).unwrap();
-        problem.settings = settings;
+        problem.settings = *settings;
         let (options, cancel) = (SolveOptions::default(), CancelToken::default());
         let space = bound_grid::table_i().unwrap();
         let root = solve(&problem, None, &options, &mut |_| {}, &cancel).unwrap();
@@ -111,7 +111,7 @@ mod tests {
     /// The certificates of all gaits are computed here, without the search.
     #[test]
     fn best_gait_is_the_certified_one_with_the_lowest_gait_rmse() {
-        let (family, map) = atlas(GaitSettings::default(), &[0, 4000, 8000, 11_000]);
+        let (family, map) = atlas(&GaitSettings::default(), &[0, 4000, 8000, 11_000]);
         let (mut table, mut numbers) = (Vec::new(), BTreeSet::new());
         // Each gait is that of many actions.
         for row in map.rows().filter(|row| row.number.is_some_and(|number| numbers.insert(number))) {
@@ -135,7 +135,7 @@ mod tests {
     fn gaits_on_a_mesh_that_is_too_coarse_are_not_certified() {
         let mut settings = GaitSettings::default();
         (settings.mesh.ds2, settings.mesh.ds3, settings.mesh.ss2, settings.mesh.ss1) = (2, 2, 3, 3);
-        let (family, map) = atlas(settings, &[]);
+        let (family, map) = atlas(&settings, &[]);
         assert!(matches!(found(family, map), BestCertifiedGaitSearch::NoneCertified));
     }
 
