@@ -156,9 +156,10 @@ fn deriving_types(text: &str) -> Vec<DerivingType<'_>> {
         let item = &rest[item..];
         let (head, body) = item.split_at(item.find(['{', ';']).unwrap());
         // Formatted items end with a brace that is not indented.
-        let all: Vec<&str> = match body.starts_with('{') {
-            true => body.lines().take_while(|line| *line != "}").skip(1).collect(),
-            false => vec![&head[head.find('(').unwrap_or(head.len())..]],
+        let all: Vec<&str> = if body.starts_with('{') {
+            body.lines().take_while(|line| *line != "}").skip(1).collect()
+        } else {
+            vec![&head[head.find('(').unwrap_or(head.len())..]]
         };
         let variants = body.lines().take_while(|line| line.trim() != "}").skip(1);
         let mut variants = variants.filter(|line| !line.trim_start().starts_with(['/', '#']));

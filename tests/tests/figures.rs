@@ -139,7 +139,7 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
         for (page, bands) in [
             (format!("/studies/{study}/figures"), 1),
             (format!("/trials/{trial}"), 2),
-            (format!("/reference-gaits/{}", reference), 2),
+            (format!("/reference-gaits/{reference}"), 2),
         ] {
             let page = service.fetch(&page).await.text;
             assert_eq!(page.contains("The band shows one standard deviation on either side of the mean."), band);
