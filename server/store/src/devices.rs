@@ -5,7 +5,7 @@ use gait_optimizer::Device as Definition;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// DeviceRow. Changing a definition creates a new device, so that studies keep the one they use.
+/// A device. Changing a definition creates a new device, so that studies keep the one they use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeviceRow {
     /// Identifier.

@@ -7,7 +7,7 @@ use gait_optimizer::muscle::MuscleParameters;
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
-/// SubjectRow, known by a pseudonym only.
+/// A subject, known by a pseudonym only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SubjectRow {
     /// Identifier.
