@@ -185,3 +185,65 @@ async fn chart_of_a_running_solve_remains_after_its_end() {
     assert!(2 < running && running < ended, "{running} {ended}");
     service.stop().await;
 }
+
+#[tokio::test]
+async fn up_to_three_other_gaits_are_laid_over_a_gait() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let study = service.study(|new| new.number_of_trials = 12).await;
+    service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = service.trials(study).await;
+    let gait = trials.iter().find(|trial| trial.state == TrialState::Converged).unwrap();
+    let page = format!("/trials/{}", gait.id);
+    let alone = service.fetch(&page).await.text;
+    let offered: Vec<String> =
+        alone.split("name=\"other\" value=\"").skip(1).map(|rest| rest.split('"').next().unwrap().to_owned()).collect();
+    assert!(offered.len() > 3 && !offered.contains(&gait.id.to_string()), "{offered:?}");
+    let number = |id: &str| trials.iter().find(|trial| trial.id.to_string() == id).unwrap().number;
+    let numbers: Vec<u32> = offered[..3].iter().map(|id| number(id)).collect();
+
+    // As the form sends the choice.
+    let query = offered[..3].iter().map(|id| format!("other={id}")).collect::<Vec<_>>().join("&");
+    let shown = service.fetch(&format!("{page}?{query}")).await;
+    assert_eq!(shown.status, StatusCode::OK, "{}", shown.text);
+    assert_eq!(shown.text.matches(" checked>").count(), 3, "the choice is kept");
+    let drawings = linked(&shown.text, ".svg");
+    let overlaid: Vec<&String> = drawings.iter().filter(|address| address.contains("?other=")).collect();
+    assert_eq!(overlaid.len(), 7 + 6 + 6, "angles, torques and powers of each joint of each leg: {drawings:?}");
+    for address in &overlaid {
+        let (_, csv) = file(&service, &address.replace(".svg", ".csv")).await;
+        let csv = String::from_utf8(csv).unwrap();
+        for number in numbers.iter().chain([&gait.number]) {
+            assert!(csv.contains(&format!("\ntrial {number},")), "trial {number} in {address}: {csv}");
+        }
+    }
+    let hip = drawings.iter().find(|address| address.contains("angles-left-hip")).unwrap();
+    let (_, csv) = file(&service, &hip.replace(".svg", ".csv")).await;
+    assert!(String::from_utf8(csv).unwrap().contains("\nreference,"), "the reference stays");
+
+    // More gaits, the same gait, a trial of another study and one without a gait are refused.
+    let query = offered[..4].iter().map(|id| format!("other={id}")).collect::<Vec<_>>().join("&");
+    let refused = service.fetch(&format!("{page}?{query}")).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let sentence = "At most 3 other gaits can be laid over a gait; 4 are chosen.";
+    assert!(refused.text.contains(sentence) && refused.text.matches(" checked>").count() == 4, "{}", refused.text);
+    assert!(!linked(&refused.text, ".svg").iter().any(|address| address.contains("?other=")));
+    let figure = format!("/api/v1/trials/{}/figures/angles-left-hip.csv", gait.id);
+    let other = service.study(|new| new.number_of_trials = 2).await;
+    service.wait_for(other, &[StudyState::Finished]).await;
+    let elsewhere = service.trials(other).await[0].id.to_string();
+    let without = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap().id.to_string();
+    for (others, reason) in [
+        (offered[..4].join(","), sentence),
+        (gait.id.to_string(), "unlike trial"),
+        (format!("{0},{0}", offered[0]), "unlike trial"),
+        (elsewhere, "a trial of this study"),
+        (without, "converged"),
+        ("x".to_owned(), "other is"),
+    ] {
+        let refused = service.fetch(&format!("{figure}?other={others}")).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{others}: {}", refused.text);
+        assert!(refused.text.contains(reason), "{reason}: {}", refused.text);
+    }
+    service.stop().await;
+}

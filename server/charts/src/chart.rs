@@ -69,8 +69,9 @@ const LEFT: f64 = 74.0;
 const RIGHT: f64 = 24.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 60.0;
-/// Distance between the bars of two legs.
+/// Distance between the bars of two cycles, and height of the bars of more than two.
 const STANCE_ROW: f64 = 10.0;
+const STANCE_ROWS: f64 = 21.0;
 /// Least gap between the numbers of two marks.
 const MARK_GAP: f64 = 6.0;
 /// Width of a character of a name above the chart, at the largest text size.
@@ -272,12 +273,16 @@ impl Chart {
         Ok(())
     }
 
-    /// Draws a bar above the chart for each leg, thick in stance and thin in swing, and a line at the end of stance.
+    /// Draws a bar above the chart for each cycle, thick in stance and thin in swing, and a line at the end of stance.
     fn draw_stances(&self, svg: &mut String, px: &impl Fn(f64) -> f64) -> std::fmt::Result {
         let bottom = HEIGHT - BOTTOM;
+        let (first, distance) = match self.cycles.len() {
+            0..=2 => (TOP - 20.0, STANCE_ROW),
+            more => (TOP - 26.0, STANCE_ROWS / (more - 1) as f64),
+        };
         for (row, cycle) in self.cycles.iter().enumerate() {
             let (Some(colour), Some(toe_off)) = (cycle.colour, cycle.toe_off_percent) else { continue };
-            let (y, colour) = (TOP - 20.0 + STANCE_ROW * row as f64, colour % 10);
+            let (y, colour) = (first + distance * row as f64, colour % 10);
             let (strike, toe_off, end) = (px(0.0), px(toe_off), px(100.0));
             write!(svg, "<path class=\"stance c{colour}\" d=\"M{strike:.1} {y}H{toe_off:.1}\"/>")?;
             write!(svg, "<path class=\"swing c{colour}\" d=\"M{toe_off:.1} {y}H{end:.1}\"/>")?;

@@ -9,6 +9,7 @@ mod leg_cycle;
 mod legs;
 mod limit_cycles;
 mod muscle_states;
+mod overlaid_gait;
 mod reference_curve;
 mod solve_charts;
 
@@ -52,12 +53,8 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
     let gait = &drawn(gait);
     let cycle = Cycle::of(gait);
     let mass_kg = gait.subject.body_mass_kg;
-    let mut groups = vec![
-        joint_angles::angles(&cycle, reference),
-        ground_forces::forces(&cycle, mass_kg),
-        joint_torques::torques(&cycle, mass_kg),
-        joint_torques::powers(&cycle, mass_kg),
-    ];
+    let mut groups = vec![joint_angles::angles(&cycle, reference), ground_forces::forces(&cycle, mass_kg)];
+    groups.extend(joint_torques::torques_and_powers(&cycle, mass_kg));
     if gait.muscles {
         groups.push(muscle_states::activations(&cycle));
         groups.push(muscle_states::fibre_lengths(&cycle));
@@ -65,6 +62,16 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
     groups.push(progress_of(&cycle, gait)?);
     groups.push(limit_cycles::limit_cycle_group(&cycle));
     Ok(groups)
+}
+
+/// The figures in which gaits are laid over each other, a chart for each joint of each leg. Groups have the names of those of
+/// one gait. Each gait comes with its name.
+pub fn of_several(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Group> {
+    let gaits = overlaid_gait::named(gaits);
+    let gaits = overlaid_gait::overlaid(&gaits);
+    let mut groups = vec![joint_angles::angles_of_several(&gaits, reference)];
+    groups.extend(joint_torques::torques_and_powers_of_several(&gaits));
+    groups
 }
 
 /// Phase and hip velocity, which the virtual constraints control in most domains.

@@ -215,6 +215,19 @@ pub(crate) async fn accessible<T: Located>(
     }
 }
 
+/// The identifiers, if the caller can access every object.
+pub(crate) async fn all_accessible<T: Located>(
+    db: &mut Connection,
+    reach: Reach,
+    named: Vec<Named<T>>,
+) -> Result<Vec<T>, Error> {
+    let mut found = Vec::new();
+    for named in named {
+        found.push(named.accessible(db, reach).await?);
+    }
+    Ok(found)
+}
+
 impl<T> From<T> for Named<T> {
     fn from(id: T) -> Self {
         Self(id)

@@ -17,6 +17,7 @@ use gait_optimizer::settings::Naturalness;
 use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::overlaid_gaits::MOST_OTHERS;
 use gaitwright_service::studies::seed::LARGEST_SEED;
 use gaitwright_store::trial_list::SORTS;
 use serde_json::{Map, Value, json};
@@ -43,7 +44,7 @@ const NAMES: [(&str, &str, u32); 13] = [
 ];
 
 /// Parameters with rules.
-const PARAMETERS: [&str; 9] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "x", "y"];
+const PARAMETERS: [&str; 10] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "other", "x", "y"];
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
@@ -366,16 +367,21 @@ fn state_parameter(parameter: &mut Value) {
             json!({ "enum": names })
         }
         "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
-        "ids" => {
-            let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
-            json!({ "pattern": format!("^{id}(,{id}){{1,19}}$") })
-        }
+        "ids" => identifiers(2, 20),
+        // A study is compared with one other study, whose identifier is a schema.
+        "other" if parameter["schema"].get("$ref").is_none() => identifiers(1, MOST_OTHERS),
         "x" | "y" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };
     if let Some(schema) = parameter.get_mut("schema").and_then(Value::as_object_mut) {
         merge(schema, &rule);
     }
+}
+
+/// Comma-separated identifiers.
+fn identifiers(least: usize, most: usize) -> Value {
+    let id = "[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}";
+    json!({ "pattern": format!("^{id}(,{id}){{{},{}}}$", least - 1, most - 1) })
 }
 
 /// Whether a schema says more of values than their types: a value of the right type can be refused.

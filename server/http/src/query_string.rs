@@ -2,8 +2,9 @@
 
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::json_document;
-use serde::de::value::{Error as Refused, MapDeserializer, StrDeserializer};
+use serde::de::value::{Error as Refused, MapDeserializer, SeqDeserializer, StrDeserializer};
 use serde::de::{DeserializeOwned, Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};
+use std::collections::HashMap;
 use std::str::FromStr;
 
 /// Name and value of each parameter.
@@ -63,8 +64,16 @@ pub(crate) fn read_form<T: DeserializeOwned>(body: &[u8]) -> Result<T, Error> {
 
 /// Reads named values. `what` is the word for one of them.
 fn read_from<T: DeserializeOwned>(pairs: &Pairs, what: &str) -> Result<T, Error> {
-    let values = pairs.iter().map(|(name, value)| (name.as_str(), Text(value)));
-    let reader = MapDeserializer::<_, Refused>::new(values);
+    let mut given: Vec<(&str, Given<'_>)> = Vec::new();
+    let mut places: HashMap<&str, usize> = HashMap::new();
+    for (name, value) in pairs {
+        let place = *places.entry(name).or_insert(given.len());
+        match given.get_mut(place) {
+            Some((_, known)) => known.values.push(value),
+            None => given.push((name, Given { name, values: vec![value] })),
+        }
+    }
+    let reader = MapDeserializer::<_, Refused>::new(given.into_iter());
     serde_path_to_error::deserialize(reader).map_err(|error| {
         let path = error.path().to_string();
         refusal(&path, &error.into_inner().to_string(), pairs, what)
@@ -73,7 +82,12 @@ fn read_from<T: DeserializeOwned>(pairs: &Pairs, what: &str) -> Result<T, Error>
 
 fn refusal(path: &str, message: &str, pairs: &Pairs, what: &str) -> Error {
     let named = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').next());
-    let value = |field: &str| pairs.iter().find(|(name, _)| name == field).map(|(_, value)| value.as_str());
+    // An entry of a list, such as `places[1]`, is named by its list.
+    let (path, place) = match path.split_once('[') {
+        Some((list, place)) => (list, place.trim_end_matches(']').parse().ok()),
+        None => (path, None),
+    };
+    let value = |field: &str| values(pairs, field).next();
     let unreadable = |field: &str, message: String, allowed: &str| {
         let (field, value, allowed) = (field.to_owned(), value(field).map(Into::into), Some(allowed.to_owned()));
         Error::Unreadable(Box::new(FieldError { message, field, value, allowed }))
@@ -100,13 +114,116 @@ fn refusal(path: &str, message: &str, pairs: &Pairs, what: &str) -> Error {
     } else {
         message.to_owned()
     };
-    let value = value(path).unwrap_or_default();
+    let value = place.map_or_else(|| value(path), |place| entries(values(pairs, path)).nth(place)).unwrap_or_default();
     Error::Invalid(Box::new(FieldError {
         message: format!("The {what} {path} is {}; it must be {allowed}.", json_document::shortened(&value.into())),
         field: path.to_owned(),
         value: Some(value.into()),
         allowed: Some(allowed),
     }))
+}
+
+/// Every value of a parameter.
+fn values<'a>(pairs: &'a Pairs, field: &str) -> impl Iterator<Item = &'a str> {
+    pairs.iter().filter(move |(name, _)| name == field).map(|(_, value)| value.as_str())
+}
+
+/// The entries of a list, which is a repeated parameter or has commas.
+fn entries<'a>(values: impl Iterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
+    values.flat_map(|value| value.split(',')).map(str::trim).filter(|value| !value.is_empty())
+}
+
+/// Every value of a parameter. Only a list can have several.
+struct Given<'de> {
+    name: &'de str,
+    values: Vec<&'de str>,
+}
+
+impl<'de> IntoDeserializer<'de, Refused> for Given<'de> {
+    type Deserializer = Self;
+
+    fn into_deserializer(self) -> Self {
+        self
+    }
+}
+
+impl<'de> Given<'de> {
+    fn single(&self) -> Result<Text<'de>, Refused> {
+        match self.values[..] {
+            [value] => Ok(Text(value)),
+            _ => Err(Refused::custom(format_args!("duplicate field `{}`", self.name))),
+        }
+    }
+}
+
+macro_rules! of_single {
+    ($($deserialize:ident)*) => {$(
+        fn $deserialize<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refused> {
+            self.single()?.$deserialize(visitor)
+        }
+    )*};
+}
+
+impl<'de> Deserializer<'de> for Given<'de> {
+    type Error = Refused;
+
+    of_single! {
+        deserialize_any deserialize_bool deserialize_char deserialize_str deserialize_string deserialize_identifier
+        deserialize_i8 deserialize_i16 deserialize_i32 deserialize_i64 deserialize_i128
+        deserialize_u8 deserialize_u16 deserialize_u32 deserialize_u64 deserialize_u128
+        deserialize_f32 deserialize_f64 deserialize_bytes deserialize_byte_buf deserialize_unit deserialize_map
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refused> {
+        visitor.visit_seq(SeqDeserializer::new(entries(self.values.into_iter()).map(Text)))
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refused> {
+        visitor.visit_some(self)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Refused> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    fn deserialize_enum<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        variants: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Refused> {
+        self.single()?.deserialize_enum(name, variants, visitor)
+    }
+
+    fn deserialize_unit_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Refused> {
+        self.deserialize_any(visitor)
+    }
+
+    fn deserialize_tuple<V: Visitor<'de>>(self, _: usize, visitor: V) -> Result<V::Value, Refused> {
+        self.deserialize_seq(visitor)
+    }
+
+    fn deserialize_tuple_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: usize,
+        visitor: V,
+    ) -> Result<V::Value, Refused> {
+        self.deserialize_seq(visitor)
+    }
+
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, Refused> {
+        self.deserialize_any(visitor)
+    }
+
+    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refused> {
+        visitor.visit_unit()
+    }
 }
 
 /// The value of a parameter: text that stands for what is asked for.
@@ -201,6 +318,8 @@ mod tests {
         order: Option<Order>,
         #[serde(default)]
         contains: String,
+        #[serde(default)]
+        places: Vec<u32>,
     }
 
     fn refusal(query: &str) -> (String, String) {
@@ -213,8 +332,15 @@ mod tests {
     #[test]
     fn query_values_are_parsed_to_the_types_of_their_fields() {
         let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap()).unwrap();
-        let expected = Asked { number: 7, share: Some(0.5), order: Some(Order::Descending), contains: "12".to_owned() };
-        assert_eq!(asked, expected);
+        let (order, contains) = (Some(Order::Descending), "12".to_owned());
+        assert_eq!(asked, Asked { number: 7, share: Some(0.5), order, contains, places: Vec::new() });
+    }
+
+    #[test]
+    fn list_is_repeated_or_separated_by_commas() {
+        for query in ["number=1&places=3&places=4,5", "places=3%2C4%2C&number=1&places=5", "places=3,4,5&number=1"] {
+            assert_eq!(read::<Asked>(&pairs(query).unwrap()).unwrap().places, [3, 4, 5], "{query}");
+        }
     }
 
     #[test]
@@ -236,9 +362,14 @@ mod tests {
             ("share=1", "number", "The query parameter number is missing."),
             ("number=1&number=2", "number", "The query parameter number occurs twice."),
             (
+                "number=1&places=3&places=x",
+                "places",
+                "The query parameter places is \"x\"; it must be a whole number of at least 0.",
+            ),
+            (
                 "number=1&nmber=2",
                 "nmber",
-                "The query parameter nmber is unknown. Known query parameters: number, share, order, contains.",
+                "The query parameter nmber is unknown. Known query parameters: number, share, order, contains, places.",
             ),
         ] {
             assert_eq!(refusal(query), (field.to_owned(), message.to_owned()));

@@ -5,6 +5,7 @@ use gait_optimizer::{Gait, IterationRecord, SolveOutcome, WarmStart};
 use gaitwright_compute::OnPool;
 use serde::de::DeserializeOwned;
 use sqlx::Row;
+use std::collections::HashSet;
 
 /// A compressed gait, ready to be written.
 #[derive(Debug)]
@@ -106,6 +107,18 @@ pub async fn is_described(db: &mut Connection, trial: TrialId, gait: &Gait) -> S
 pub async fn exists(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
     let row = sqlx::query("select exists(select 1 from gaits where trial_id = ?)").bind(trial).fetch_one(db).await?;
     Ok(row.try_get(0)?)
+}
+
+/// Those of the trials whose gait, or last iterate, is in the record.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn existing(db: &mut Connection, of: &[TrialId]) -> StoreResult<HashSet<TrialId>> {
+    let rows = sqlx::query("select trial_id from gaits where trial_id in (select value from json_each(?))")
+        .bind(json_columns::to_text("trials", of)?)
+        .fetch_all(db)
+        .await?;
+    rows.iter().map(|row| Ok(row.try_get(0)?)).collect()
 }
 
 /// The gait of a trial.

@@ -166,6 +166,50 @@ async fn browser_has_one_cursor_for_walker_and_charts() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn browser_lays_other_gaits_over_a_gait_without_scripts() {
+    let Some(browser) = Chromium::launch().await else { return };
+    let axe = Axe::find();
+    let site = Site::start(Analytic::default()).await;
+    let study = site.service.study(|new| new.number_of_trials = 12).await;
+    site.service.wait_for(study, &[StudyState::Finished]).await;
+    let trials = site.service.trials(study).await;
+    let trial = trials.iter().find(|trial| trial.state == TrialState::Converged).unwrap();
+    let page = browser.open_without_scripts(&site.at(&format!("/trials/{}", trial.id))).await;
+    page.click("#overlay summary").await;
+    for place in 1..=3 {
+        page.click(&format!("#overlay label:nth-child({place}) input")).await;
+    }
+    page.click("#overlay form button").await;
+    page.wait_for("#overlay a").await;
+    for (group, charts) in [("angles", 7), ("torques", 6), ("powers", 6), ("forces", 2)] {
+        assert_eq!(page.count(&format!("#{group} svg.chart")).await, charts, "{group}");
+    }
+    // This gait, three others and, for angles, the reference; each has its colour and its dash.
+    assert_eq!(page.count("#overlay input:checked").await, 3);
+    let legend = page.text("#angles .legend").await;
+    assert!(legend.contains(&format!("trial {}", trial.number)) && legend.contains("reference"), "{legend}");
+    let lines = "(() => { const lines = [...document.querySelectorAll('#torques svg.chart')[0].querySelectorAll('.line')]; \
+                 return new Set(lines.map(line => getComputedStyle(line).stroke + getComputedStyle(line).strokeDasharray)).size })()";
+    assert_eq!(page.value(lines).await, "4");
+    for (width, height) in [(1280, 800), (768, 1024), (390, 844)] {
+        page.resize(width, height).await;
+        assert_eq!(page.beyond().await, "0", "{width} x {height}");
+    }
+    let bytes = page.value("document.documentElement.outerHTML.length").await;
+    assert!(bytes.parse::<u32>().unwrap() < 400_000, "{bytes} bytes");
+    page.click("#overlay a").await;
+    page.wait_until("document.querySelectorAll('#angles svg.chart').length === 4").await;
+    // With scripts, the cursor stands in every chart, once for each gait.
+    let others = trials.iter().filter(|other| other.state == TrialState::Converged && other.id != trial.id);
+    let other = others.last().unwrap().id;
+    let page = browser.open(&site.at(&format!("/trials/{}?other={other}", trial.id))).await;
+    page.wait_for("#angles .cursor").await;
+    is_accessible(axe.as_ref(), &page).await;
+    page.is_clean(&site.origin).await;
+    browser.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn browser_zooms_charts_to_a_part_of_the_cycle() {
     let Some(browser) = Chromium::launch().await else { return };
     let axe = Axe::find();

@@ -72,6 +72,13 @@ fn stance_and_swing_of_each_leg_are_marked_on_its_own_cycle() {
     assert!(svg.contains("<path class=\"stance c0\" d=\"M74.0 38H345.0\"/>"), "{svg}");
     assert_eq!((svg.matches("class=\"swing").count(), svg.matches("class=\"toe_off").count()), (2, 2));
     assert_eq!(chart.legend()[1].0, "key stance", "{:?}", chart.legend());
+    // The bars of four gaits fit between the label of the axis and the plot.
+    chart.cycles = (0..4).map(|colour| cycle(Some(colour), 0.0, Some(60.0))).collect();
+    let svg = chart.svg();
+    for (colour, height) in [(0, "32"), (1, "39"), (2, "46"), (3, "53")] {
+        let bar = format!("<path class=\"stance c{colour}\" d=\"M74.0 {height}H");
+        assert!(svg.contains(&bar), "{bar}: {svg}");
+    }
     chart.cycles = vec![cycle(None, 0.0, None)];
     assert!(chart.svg().contains("data-cycles=\"* 0.00\"") && !chart.svg().contains("class=\"stance"));
 }

@@ -1,9 +1,9 @@
 //! Joint angles. Every chart of them is made here, from [`JointAngle`]s, which know the leg over whose cycle they are drawn.
 
-use super::drawn_gait::{drawn, stroke};
 use super::group::Group;
 use super::leg_cycle::{Cycle, Leg, Look};
-use super::legs::{CYCLE, JOINTS};
+use super::legs::{CYCLE, JOINTS, cycle_of_leg};
+use super::overlaid_gait::{OverlaidGait, named, overlaid};
 use super::reference_curve::{band_in_words, cycle_of, with_curve};
 use crate::{Chart, Stroke};
 use gait_optimizer::{Gait, ReferenceGait};
@@ -70,12 +70,21 @@ pub(super) fn angles(cycle: &Cycle<'_>, reference: &ReferenceGait) -> Group {
         });
         sides.iter().fold(below, |chart, angle| angle.with_gait(chart, cycle, &Look::of(angle.leg)))
     };
+    group("Torso lean is drawn over the cycle of each leg.", reference, BOTH_SIDES.into_iter().map(draw).collect())
+}
+
+/// The same angles of several gaits, a chart for each joint of each leg.
+pub(super) fn angles_of_several(gaits: &[OverlaidGait<'_>], reference: &ReferenceGait) -> Group {
+    group("Torso lean is drawn over the cycle of the right leg.", reference, charts_of_several(gaits, reference))
+}
+
+fn group(torso: &str, reference: &ReferenceGait, charts: Vec<Chart>) -> Group {
     let hint = format!(
-        "Flexion, dorsiflexion and forward lean are positive. Torso lean is drawn over the cycle of each leg. Reference gait: {}. {} There is no reference for the joints of the prosthesis.",
+        "Flexion, dorsiflexion and forward lean are positive. {torso} Reference gait: {}. {} There is no reference for the joints of the prosthesis.",
         reference.name,
         band_in_words(reference)
     );
-    Group::new("angles", "Joint angles", hint, BOTH_SIDES.into_iter().map(draw).collect())
+    Group::new("angles", "Joint angles", hint, charts)
 }
 
 /// The joint angles of a reference gait alone, both legs in one chart.
@@ -106,15 +115,18 @@ pub fn of_reference_in_one_chart(reference: &ReferenceGait) -> Chart {
 
 /// The joint angles of gaits over those of a reference gait, a chart for each joint. Each gait comes with its name.
 pub fn with_reference(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Chart> {
-    let gaits: Vec<(&str, Gait)> = gaits.iter().map(|(name, gait)| (*name, drawn(gait))).collect();
-    let cycles: Vec<(&str, Cycle<'_>)> = gaits.iter().map(|(name, gait)| (*name, Cycle::of(gait))).collect();
+    charts_of_several(&overlaid(&named(gaits)), reference)
+}
+
+fn charts_of_several(gaits: &[OverlaidGait<'_>], reference: &ReferenceGait) -> Vec<Chart> {
     let draw = |angle: JointAngle| {
-        let chart = chart(angle.title, &format!("gait cycle from {} heel strike, %", angle.leg.name()));
+        let chart = chart(angle.title, &cycle_of_leg(angle.leg));
         let look = Look { label: "reference", colour: REFERENCE, stroke: Stroke::Dotted };
         let chart = angle.with_reference(chart, reference, &look, Some(ONE_DEVIATION));
-        cycles.iter().enumerate().fold(chart, |chart, (place, (name, cycle))| {
-            angle.with_gait(chart, cycle, &Look { label: name, colour: place, stroke: stroke(place) })
-        })
+        let with = |chart, gait: &OverlaidGait<'_>| {
+            gait.with_line(chart, angle.leg, |point| point.q[angle.coordinate].to_degrees())
+        };
+        gaits.iter().fold(chart, with)
     };
     every_angle().map(draw).collect()
 }

@@ -1,7 +1,7 @@
 //! REST: downloads of figures as SVG, PNG and CSV.
 
 use crate::AppState;
-use crate::accessible::{Id, Named, accessible};
+use crate::accessible::{Id, Named, accessible, all_accessible};
 use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
@@ -18,18 +18,19 @@ use gaitwright_service::error::Error;
 use gaitwright_store::{LabSessionId, ReferenceGaitId, StudyId, TrialId, reference_gaits};
 use serde::Deserialize;
 
-/// A second study or trial for comparison.
+/// A second study for comparison.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct OtherOverlaid<T> {
-    other: Option<Named<T>>,
+pub(super) struct ComparedStudy {
+    other: Option<Named<StudyId>>,
 }
 
 /// What a figure of a trial shows.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ShownGait {
-    other: Option<Named<TrialId>>,
+    #[serde(default)]
+    other: Vec<Named<TrialId>>,
     local_optimum: Option<u32>,
 }
 
@@ -52,7 +53,7 @@ pub(super) async fn of_study(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     Path((_, file)): Path<(String, String)>,
-    Params(OtherOverlaid { other }): Params<OtherOverlaid<StudyId>>,
+    Params(ComparedStudy { other }): Params<ComparedStudy>,
 ) -> Result<Response, Refusal> {
     let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
     let figures = study::of_study(&mut app, id, other).await?.into_figures();
@@ -61,8 +62,8 @@ pub(super) async fn of_study(
 
 /// Download a figure of a trial
 ///
-/// While the solve is running, shows its progress. With another trial, shows the joint angles of both. With a local optimum,
-/// shows the gait of that one.
+/// While the solve is running, shows its progress. With other trials, shows the joint angles, torques and powers of all of
+/// them, a figure for each joint of each leg. With a local optimum, shows the gait of that one.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",
@@ -71,7 +72,7 @@ pub(super) async fn of_study(
     params(
         ("id" = TrialId, Path, description = "Identifier of the trial"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("other" = Option<TrialId>, Query, description = "Identifier of a converged trial of the same study for comparison"),
+        ("other" = Option<String>, Query, description = "1 to 3 comma-separated identifiers of converged trials of the same study with different gaits, which are laid over that of this trial"),
         ("local_optimum" = Option<u32>, Query, description = "Number of another local optimum of the trial. Without `other`")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
@@ -84,12 +85,12 @@ pub(super) async fn of_trial(
     Path((_, file)): Path<(String, String)>,
     Params(ShownGait { other, local_optimum }): Params<ShownGait>,
 ) -> Result<Response, Refusal> {
-    let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
-    let figures = match (other, local_optimum) {
-        (None, None) => trial::of_trial(&mut app, id).await?,
-        (None, Some(number)) => trial::of_local_optimum(&mut app, id, number).await?,
-        (Some(other), None) => trial::of_pair(&mut app, id, other).await?,
-        (Some(_), Some(number)) => return Err(Error::invalid("local_optimum", number, "absent beside other").into()),
+    let others = all_accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
+    let figures = match (&others[..], local_optimum) {
+        ([], None) => trial::of_trial(&mut app, id).await?,
+        ([], Some(number)) => trial::of_local_optimum(&mut app, id, number).await?,
+        (others, None) => trial::of_several(&mut app, id, others).await?,
+        (_, Some(number)) => return Err(Error::invalid("local_optimum", number, "absent beside other").into()),
     };
     response(&mut app, figures, file).await
 }

@@ -1,4 +1,4 @@
-//! The figures of a trial: its gait, its solve, and its gait beside that of another trial.
+//! The figures of a trial: its gait, its solve, and its gait under those of other trials.
 
 use crate::shared_state::AppState;
 use gait_optimizer::gait::stick_figure::stick_figures;
@@ -6,8 +6,9 @@ use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::{Figure, GaitWalker, gait_charts};
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::preference_answer;
-use gaitwright_store::{TrialId, gaits, other_local_optima, reference_gaits, studies, trials};
+use gaitwright_service::studies::overlaid_gaits;
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{Connection, Packed, TrialId, gaits, other_local_optima, reference_gaits, studies, trials};
 
 /// Every figure of the page of a gait; while its solve runs, the solver progress.
 ///
@@ -50,30 +51,52 @@ pub(crate) async fn of_local_optimum(app: &mut AppState, id: TrialId, number: u3
     app.compute(draw).await?
 }
 
-/// The joint angles of two gaits of a study, as on the page that compares them.
+/// The gait of a trial and those of other trials of its study, in the same charts.
+pub(crate) struct OverlaidGaits(Vec<(u32, Packed<Gait>)>);
+
+impl OverlaidGaits {
+    /// # Errors
+    /// [`Error::NotFound`], [`Error::Invalid`] for a trial whose gait cannot be laid over the first one.
+    pub(crate) async fn read(db: &mut Connection, trial: &Trial, others: &[TrialId]) -> Result<Self, Error> {
+        let others = overlaid_gaits::others(db, trial, "other", others).await?;
+        let mut gaits = Vec::new();
+        for trial in std::iter::once(trial).chain(&others) {
+            gaits.push((trial.number, gaits::get(db, trial.id).await?));
+        }
+        Ok(Self(gaits))
+    }
+
+    /// Joint angles over those of the reference gait, torques and powers.
+    ///
+    /// # Errors
+    /// If a gait cannot be read.
+    pub(crate) fn draw(&self, pool: &OnPool, reference: &ReferenceGait) -> Result<Vec<gait_charts::Group>, Error> {
+        let gaits = self.0.iter().map(|(number, gait)| Ok((format!("trial {number}"), gait.unpack(pool)?)));
+        let gaits: Vec<(String, Gait)> = gaits.collect::<Result<_, Error>>()?;
+        let named: Vec<(&str, &Gait)> = gaits.iter().map(|(name, gait)| (name.as_str(), gait)).collect();
+        Ok(gait_charts::of_several(&named, reference))
+    }
+}
+
+/// The figures in which other gaits are laid over that of a trial, as on its page and on the page that compares two gaits.
 ///
 /// # Errors
-/// [`Error::NotFound`], [`Error::Invalid`] for a trial of another study; errors of the database.
-pub(crate) async fn of_pair(app: &mut AppState, a: TrialId, b: TrialId) -> Result<Vec<Figure>, Error> {
+/// As [`OverlaidGaits::read`]; errors of the database.
+pub(crate) async fn of_several(app: &mut AppState, id: TrialId, others: &[TrialId]) -> Result<Vec<Figure>, Error> {
     let mut reader = app.read().await?;
-    let trial = trials::get(&mut reader, a).await?;
-    let other = preference_answer::comparable(&mut reader, trial.study_id, "other", b).await?;
+    let trial = trials::get(&mut reader, id).await?;
     let reference = studies::get(&mut reader, trial.study_id).await?.plan.reference_gait_id;
     let reference = reference_gaits::get(&mut reader, reference).await?.definition;
-    let (Some(gait_a), Some(gait_b)) = (gaits::find(&mut reader, a).await?, gaits::find(&mut reader, b).await?) else {
-        return Ok(Vec::new());
-    };
+    let gaits = OverlaidGaits::read(&mut reader, &trial, others).await?;
     drop(reader);
-    let draw = move |pool: &OnPool| {
-        let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
-        Ok(pair((trial.number, &gait_a), (other.number, &gait_b), &reference))
-    };
+    let draw =
+        move |pool: &OnPool| Ok(gaits.draw(pool, &reference)?.into_iter().flat_map(|group| group.figures).collect());
     app.compute(draw).await?
 }
 
-/// The joint angles of two gaits, named by their trials, over the reference gait.
+/// The joint angles of two gaits, named by their places on a page and their trials, over the reference gait.
 pub(crate) fn pair((a, gait_a): (u32, &Gait), (b, gait_b): (u32, &Gait), reference: &ReferenceGait) -> Vec<Figure> {
     let (a, b) = (format!("first: trial {a}"), format!("second: trial {b}"));
     let charts = gait_charts::with_reference(&[(&a, gait_a), (&b, gait_b)], reference);
-    charts.into_iter().map(|chart| Figure::chart("pair", chart)).collect()
+    charts.into_iter().map(|chart| Figure::chart("angles", chart)).collect()
 }

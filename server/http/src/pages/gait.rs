@@ -2,6 +2,7 @@
 
 use super::certificate::{self, CertificateJob};
 use super::explanation::{FeasibleRelaxation, NoGait};
+use super::gait_overlay::{GaitOverlay, OverlayForm};
 use super::gait_summary::GaitSummary;
 use super::joint_peaks::JointPeaks;
 use super::local_optima::{self as shown_local_optima, ShownLocalOptimum};
@@ -11,10 +12,11 @@ use super::safety_review::{ReportFields, ReviewFields};
 use super::sensitivities::SensitivityTable;
 use super::simulated_walks::{SimulatedWalksSection, SimulationFields};
 use crate::AppState;
+use crate::accessible::{Named, all_accessible};
 use crate::authorization::Authorized;
 use crate::extractors::Params;
 use crate::format::{self, words};
-use crate::page_error::{PageError, PageResult, page};
+use crate::page_error::{PageError, page};
 use crate::refused_fields::{RefusedFields, TypedForm};
 use crate::visible::Visible;
 use askama::Template;
@@ -67,6 +69,8 @@ struct GaitPage {
     /// The sensitivities, or why there are none.
     sensitivities: Option<Result<SensitivityTable, String>>,
     groups: Vec<ChartSection>,
+    /// The gaits that can be laid over this one; `None` if it has no gait to show.
+    overlay: Option<GaitOverlay>,
     solve: Option<PageChart>,
     /// The stride as a row of pictures.
     tiles: Option<PageChart>,
@@ -102,6 +106,7 @@ pub(super) struct GaitForms {
     /// The refused form: `simulation`, `report` or `review`.
     pub(super) open: &'static str,
     pub(super) refused: RefusedFields,
+    pub(super) overlay: OverlayForm,
     pub(super) simulation: Option<SimulationFields>,
     pub(super) report: ReportFields,
     pub(super) review: ReviewFields,
@@ -140,6 +145,9 @@ impl GaitPage {
 pub(super) struct GaitQuery {
     #[serde(default)]
     sensitivities: bool,
+    /// The gaits to lay over this one.
+    #[serde(default)]
+    other: Vec<Named<TrialId>>,
 }
 
 /// `GET /trials/{id}`.
@@ -148,8 +156,10 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<TrialId, Read>,
     Params(shown): Params<GaitQuery>,
-) -> PageResult {
-    Box::pin(show(&mut app, authorized.caller, id, shown, GaitForms::default())).await
+) -> Result<Response, PageError> {
+    let other = all_accessible(&mut *app.read().await?, authorized.caller.reach(), shown.other).await?;
+    let forms = GaitForms { overlay: OverlayForm { other }, ..GaitForms::default() };
+    Box::pin(show(&mut app, authorized.caller, id, shown.sensitivities, forms)).await
 }
 
 /// Shows the page again with a refused form.
@@ -159,11 +169,16 @@ pub(super) async fn refuse(
     id: TrialId,
     forms: GaitForms,
 ) -> Result<Response, PageError> {
-    let status = forms.refused.status();
-    Ok((status, Box::pin(show(app, caller, id, GaitQuery::default(), forms)).await?).into_response())
+    Box::pin(show(app, caller, id, false, forms)).await
 }
 
-async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery, mut forms: GaitForms) -> PageResult {
+async fn show(
+    app: &mut AppState,
+    caller: Caller,
+    id: TrialId,
+    with_sensitivities: bool,
+    mut forms: GaitForms,
+) -> Result<Response, PageError> {
     let mut reader = app.read().await?;
     let trial = trials::get(&mut reader, id).await?;
     let study = studies::get(&mut reader, trial.study_id).await?;
@@ -193,7 +208,7 @@ async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery,
         None
     };
     let solution =
-        if with_gait && shown.sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
+        if with_gait && with_sensitivities { Some(sensitivities::solution(&mut reader, &trial).await) } else { None };
     let last_event = events::last(&mut reader, study.id).await?;
     let effort = app.scheduler.explaining(id);
     let explained = explanation::state(&mut reader, &trial, effort.clone()).await?;
@@ -202,6 +217,12 @@ async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery,
         _ => Vec::new(),
     };
     let local_optima = local_optima::of_trial(&mut reader, id).await?;
+    let overlay = match gait {
+        Some(_) if with_gait => Some(GaitOverlay::read(&mut reader, &trial, &forms.overlay).await?),
+        _ => None,
+    };
+    let status = overlay.as_ref().map(|overlay| &overlay.refused).filter(|refused| !refused.is_empty());
+    let status = status.unwrap_or(&forms.refused).status();
     let may_run = caller.may(Run::NEEDED);
     let reviews = caller.may(Answer::NEEDED);
     // Without sign-in the name is unknown.
@@ -220,11 +241,14 @@ async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery,
         let sensitivities = solution.map(|solution| SensitivityTable::new(solution, pool));
         let local_optima = local_optima::unpacked(pool, local_optima)?;
         let local_optima = shown_local_optima::shown(tried.id, &local_optima, &reference)?;
-        let drawn = draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?;
-        Ok::<_, Error>((drawn, summary, sensitivities, local_optima))
+        let mut drawn = draw(&tried, gait.as_ref(), &reference, &iterations.unwrap_or_default())?;
+        if let Some(overlay) = &overlay {
+            drawn.overlay(overlay.draw(pool, &reference)?, &files_of(&tried), &overlay.query);
+        }
+        Ok::<_, Error>((drawn, summary, sensitivities, local_optima, overlay))
     };
-    let (drawn, summary, sensitivities, local_optima) = app.compute(drawn).await.map_err(Error::from)??;
-    page(&GaitPage {
+    let (drawn, summary, sensitivities, local_optima, overlay) = app.compute(drawn).await.map_err(Error::from)??;
+    let shown = page(&GaitPage {
         state: words(trial.state.as_str()),
         rmse: format::decimal(trial.gait_rmse_rad),
         cost: format::decimal(trial.cost_of_transport),
@@ -259,8 +283,10 @@ async fn show(app: &mut AppState, caller: Caller, id: TrialId, shown: GaitQuery,
         trial,
         study,
         refused: std::mem::take(&mut forms.refused),
+        overlay,
         forms,
-    })
+    })?;
+    Ok((status, shown).into_response())
 }
 
 /// Whether every solve of the study starts from the gait of this trial.
@@ -278,6 +304,20 @@ struct ChartSection {
     charts: Vec<PageChart>,
 }
 
+impl ChartSection {
+    /// The charts of a group, whose files are in a folder, with a query.
+    fn new(group: gait_charts::Group, files: &str, query: &str) -> Self {
+        let mut charts: Vec<PageChart> = group.figures.iter().map(|f| PageChart::of(f, files, query)).collect();
+        let gait_charts::Group { id, heading, hint, .. } = group;
+        Self { id, heading, hint, legend: shared_legend(&mut charts), charts }
+    }
+}
+
+/// The folder of the figures of a trial.
+fn files_of(trial: &Trial) -> String {
+    format!("/api/v1/trials/{}/figures", trial.id)
+}
+
 /// Charts that are computed from the gait on the thread pool.
 struct GaitCharts {
     groups: Vec<ChartSection>,
@@ -288,25 +328,26 @@ struct GaitCharts {
     bounds: Vec<BoundUse>,
 }
 
+impl GaitCharts {
+    /// Shows these groups in place of those of the gait alone.
+    fn overlay(&mut self, groups: Vec<gait_charts::Group>, files: &str, query: &str) {
+        for group in groups {
+            if let Some(shown) = self.groups.iter_mut().find(|shown| shown.id == group.id) {
+                *shown = ChartSection::new(group, files, query);
+            }
+        }
+    }
+}
+
 fn draw(
     trial: &Trial,
     gait: Option<&Gait>,
     reference: &ReferenceGait,
     iterations: &[IterationRecord],
 ) -> Result<GaitCharts, Error> {
-    let files = format!("/api/v1/trials/{}/figures", trial.id);
+    let files = files_of(trial);
     let drawn = |figure: &Figure| PageChart::of(figure, &files, "");
     let groups = gait.map(|gait| gait_charts::of_gait(gait, reference)).transpose()?.unwrap_or_default();
-    let group = |group: gait_charts::Group| {
-        let mut charts: Vec<PageChart> = group.figures.iter().map(drawn).collect();
-        ChartSection {
-            id: group.id,
-            heading: group.heading,
-            hint: group.hint,
-            legend: shared_legend(&mut charts),
-            charts,
-        }
-    };
     let walker = |gait: &Gait| {
         let figure = GaitWalker::new(gait)?.with_ghost(Ghost::of_reference(gait, reference)?);
         let svg = figure.svg("A person walking one stride");
@@ -315,7 +356,7 @@ fn draw(
     let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);
     let tiles = gait.map(stick_figures).transpose()?.map(gait_charts::tiles);
     Ok(GaitCharts {
-        groups: groups.into_iter().map(group).collect(),
+        groups: groups.into_iter().map(|group| ChartSection::new(group, &files, "")).collect(),
         solve: gait_charts::solve(iterations).as_ref().map(drawn),
         tiles: tiles.as_ref().map(drawn),
         walker: gait.map(walker).transpose()?,

@@ -15,6 +15,7 @@ mod explanation;
 mod figures;
 mod gait;
 mod gait_forms;
+mod gait_overlay;
 mod gait_summary;
 mod help;
 mod home;

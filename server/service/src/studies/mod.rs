@@ -47,6 +47,7 @@ pub mod motions_reported_unsafe;
 pub mod nearest_reference;
 pub mod new_safety_report;
 mod next_step;
+pub mod overlaid_gaits;
 pub mod pending_comparison;
 mod planning_tasks;
 pub mod preference_answer;
