@@ -259,6 +259,14 @@ async fn members_are_removed_on_the_page_of_a_study_whose_subject_withdrew() {
     closed.service.stop().await;
 }
 
+/// Checks that an object in a query string, at `{}`, is refused like one that does not exist.
+async fn hides_as_unknown(service: &Service, who: &As, path: &str, id: &str) {
+    let there = send(service, who, &Method::GET, &path.replace("{}", id), "", "").await;
+    let nowhere = send(service, who, &Method::GET, &path.replace("{}", UNKNOWN), "", "").await;
+    assert_eq!(there.status, StatusCode::NOT_FOUND, "{path}: {}", there.text);
+    assert_eq!(without_identifiers(&there, id), without_identifiers(&nowhere, UNKNOWN), "{path}");
+}
+
 #[tokio::test]
 async fn lists_show_a_restricted_study_to_members_only() {
     let closed = Closed::new().await;
@@ -302,7 +310,7 @@ async fn lists_show_a_restricted_study_to_members_only() {
     everywhere.sort();
     assert_eq!(to_member, everywhere);
 
-    // Studies in the query string are not accessible either.
+    // Studies and trials in the query string are not accessible either.
     let (other, who) = (open, &outsiders.iter().find(|(_, name, ..)| *name == "read").unwrap().0);
     let study = closed.study;
     for path in [
@@ -311,10 +319,14 @@ async fn lists_show_a_restricted_study_to_members_only() {
         format!("/studies/{other}/figures?other={{}}"),
         format!("/api/v1/studies/{other}/figures/rmse.csv?other={{}}"),
     ] {
-        let there = send(service, who, &Method::GET, &path.replace("{}", &study.to_string()), "", "").await;
-        let nowhere = send(service, who, &Method::GET, &path.replace("{}", UNKNOWN), "", "").await;
-        assert_eq!(there.status, StatusCode::NOT_FOUND, "{path}: {}", there.text);
-        assert_eq!(without_identifiers(&there, &study.to_string()), without_identifiers(&nowhere, UNKNOWN), "{path}");
+        hides_as_unknown(service, who, &path, &study.to_string()).await;
+    }
+    let trial = service.trials(open).await[0].id;
+    for path in [
+        format!("/trials/{trial}?other={{}}"),
+        format!("/api/v1/trials/{trial}/figures/angles-left-hip.csv?other={{}}"),
+    ] {
+        hides_as_unknown(service, who, &path, &closed.names["trials"]).await;
     }
     closed.service.stop().await;
 }

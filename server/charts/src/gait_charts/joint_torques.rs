@@ -9,7 +9,7 @@ use crate::gait_series::Point;
 use gait_optimizer::body::Side;
 
 /// What a group shows of each joint.
-struct Quantity {
+struct JointQuantity {
     id: &'static str,
     heading: &'static str,
     axis: &'static str,
@@ -19,7 +19,7 @@ struct Quantity {
 }
 
 /// Internal torques, positive in extension and plantarflexion.
-const TORQUE: Quantity = Quantity {
+const TORQUE: JointQuantity = JointQuantity {
     id: "torques",
     heading: "Joint torques",
     axis: "torque, N m/kg",
@@ -29,7 +29,7 @@ const TORQUE: Quantity = Quantity {
 };
 
 /// Power of each joint, the product of its torque and its velocity.
-const POWER: Quantity = Quantity {
+const POWER: JointQuantity = JointQuantity {
     id: "powers",
     heading: "Joint powers",
     axis: "power, W/kg",
@@ -51,7 +51,7 @@ fn actuator(leg: Leg, joint: usize) -> usize {
     }
 }
 
-impl Quantity {
+impl JointQuantity {
     fn group(&self, charts: Vec<Chart>) -> Group {
         Group::new(self.id, self.heading, self.hint, charts)
     }

@@ -76,15 +76,16 @@ class FiguresMethods(Transport):
         trial_id: TrialId,
         file: str,
         *,
-        other: Optional[TrialId] = None,
+        other: Optional[str] = None,
         local_optimum: Optional[int] = None,
     ) -> bytes:
         """Download a figure of a trial.
 
-        While the solve is running, shows its progress. With another trial, shows the joint angles of both. With a local
-        optimum, shows the gait of that one.
+        While the solve is running, shows its progress. With other trials, shows the joint angles, torques and powers of
+        all of them, a figure for each joint of each leg. With a local optimum, shows the gait of that one.
 
-        other: Identifier of a converged trial of the same study for comparison.
+        other: 1 to 3 comma-separated identifiers of converged trials of the same study with different gaits, which are
+        laid over that of this trial.
 
         local_optimum: Number of another local optimum of the trial. Without `other`.
         """
