@@ -38,6 +38,8 @@ pub(super) struct OfferedTrials {
 /// The gaits that can be laid over that of the page, and those that are.
 pub(super) struct GaitOverlay {
     pub(super) offered: Vec<OfferedTrials>,
+    /// Maximum number of chosen trials.
+    pub(super) most: usize,
     /// Whether older trials are not offered.
     pub(super) newest_only: bool,
     /// Why the choice was refused.
@@ -59,6 +61,7 @@ impl GaitOverlay {
         let identifiers: Vec<String> = chosen.iter().map(TrialId::to_string).collect();
         Ok(Self {
             offered: pools.iter().filter_map(|pool| OfferedTrials::of(pool, chosen)).collect(),
+            most: MOST_OTHERS,
             newest_only: trials::counts(db, trial.study_id).await?.total > OFFERED,
             refused,
             query: format!("?other={}", identifiers.join(",")),
@@ -69,10 +72,6 @@ impl GaitOverlay {
     /// The charts of all gaits; none if no other gait is chosen.
     pub(super) fn draw(&self, pool: &OnPool, reference: &ReferenceGait) -> Result<Vec<Group>, Error> {
         self.gaits.as_ref().map_or_else(|| Ok(Vec::new()), |gaits| gaits.draw(pool, reference))
-    }
-
-    pub(super) fn most(&self) -> usize {
-        MOST_OTHERS
     }
 
     /// Whether the choice is of interest at once.
