@@ -203,8 +203,8 @@ async fn browser_lays_other_gaits_over_a_gait_without_scripts() {
     page.click_plainly("#overlay a").await;
     page.wait_until("document.querySelectorAll('#angles svg.chart').length === 4").await;
     // With scripts, the cursor stands in every chart, once for each gait.
-    let others = trials.iter().filter(|other| other.state == TrialState::Converged && other.id != trial.id);
-    let other = others.last().unwrap().id;
+    let mut others = trials.iter().filter(|other| other.state == TrialState::Converged && other.id != trial.id);
+    let other = others.next_back().unwrap().id;
     let page = browser.open(&site.at(&format!("/trials/{}?other={other}", trial.id))).await;
     page.wait_for("#angles .cursor").await;
     is_accessible(axe.as_ref(), &page).await;
