@@ -49,6 +49,10 @@ ConsentKind = Literal["given", "withdrawn"]
 # A contact point of the foot.
 ContactPoint = Literal["heel", "toe"]
 
+# The heel strike at which the cycle of a channel begins: `right_heel_strike`; `left_heel_strike`, as recorded; or
+# `assumed_left_heel_strike`, half a stride after the right one.
+CycleStart = Literal["right_heel_strike", "left_heel_strike", "assumed_left_heel_strike"]
+
 # Identifier of a device.
 DeviceId = str
 
@@ -982,6 +986,9 @@ class CurrentUser(TypedDict):
 class CycleActivity(TypedDict):
     """Activity of a channel at 0, 1, ..., 100 % of the gait cycle, mean over strides."""
 
+    # Heel strike at which the cycle begins: that of the leg of the channel. Results stored without this value begin at
+    # right heel strike.
+    begins_at: CycleStart
     # Name of the channel.
     channel: str
     # Mean over strides, relative to the peak of walk 1.
@@ -1130,13 +1137,19 @@ class EmgReading(TypedDict, total=False):
     format: MeasurementFormat
     # Column of a switch under the right heel, or of the vertical force under the right foot.
     heel_strike_column: Optional[str]
-    # Value of `heel_strike_column`, in the unit of the column, above which the foot is on the ground.
+    # Value of the columns of heel strikes, in their unit, above which a foot is on the ground.
     heel_strike_threshold: float
     # Times of right heel strikes, s, on the time axis of the file. If empty, they are detected in `heel_strike_column`.
     heel_strikes_s: list[float]
+    # Column of a switch under the left heel, or of the vertical force under the left foot.
+    left_heel_strike_column: Optional[str]
+    # Times of left heel strikes, s. The cycle of the left leg begins with them. If neither these times nor
+    # `left_heel_strike_column` are given, the left foot is taken to strike half a stride after the right one.
+    left_heel_strikes_s: list[float]
     # Sampling rate of a CSV file without a `time_s` column, Hz.
     rate_hz: Optional[float]
-    # Numbers of the strides to leave out, counted from 1 in the order of the heel strikes.
+    # Numbers of the strides to leave out, counted from 1 in the order of the right heel strikes. Strides of the left
+    # leg that overlap with them are left out too.
     rejected_strides: list[int]
 
 
@@ -3533,8 +3546,8 @@ class WalkActivity(TypedDict):
 
     # Mean of each channel over the cycle, relative to the peak of walk 1.
     averages: list[float]
-    # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
-    # the peak of walk 1.
+    # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from the heel strike of its leg,
+    # relative to the peak of walk 1.
     channels: list[CycleActivity]
     # EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
     emg_rmse: Optional[EmgRmse]

@@ -19,6 +19,7 @@ pub mod certificate_request;
 pub mod certification;
 pub mod certified_best;
 mod certifier;
+mod column_names;
 pub mod command;
 pub mod consent;
 mod controller_file;
