@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_optimizer::ReferenceGait;
 use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
@@ -185,4 +186,163 @@ async fn first_step_without_heel_strikes_says_so_and_keeps_entries_of_later_step
     assert!(signals.text.contains("<input type=\"hidden\" name=\"rejected_strides\" value=\"3\">"));
     assert!(signals.text.contains("<input type=\"hidden\" name=\"column_RF_L\" value=\"TA_L\">"));
     visit.service.stop().await;
+}
+
+/// Eight strides of the built-in reference gait, 1.1 s each, in degrees: torso, left and right hip, knee and ankle.
+fn laboratory_angles(signs: [f64; 7]) -> String {
+    let reference = ReferenceGait::builtin().unwrap();
+    let mut text = "Time,Trunk,L Hip,L Knee,L Ankle,R Hip,R Knee,R Ankle\n".to_owned();
+    for row in 0..880 {
+        let time = f64::from(row) / 100.0;
+        write!(text, "{time}").unwrap();
+        for (angle, sign) in reference.seven_angles(time / 1.1).iter().zip(signs) {
+            write!(text, ",{:.6}", sign * angle.to_degrees()).unwrap();
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The choice of columns for a file of [`laboratory_angles`].
+const CHOSEN: [(&str, &str); 7] = [
+    ("column_torso", "Trunk"),
+    ("column_hip_L", "L Hip"),
+    ("column_knee_L", "L Knee"),
+    ("column_ankle_L", "L Ankle"),
+    ("column_hip_R", "R Hip"),
+    ("column_knee_R", "R Knee"),
+    ("column_ankle_R", "R Ankle"),
+];
+const LEFT_ANKLE_REVERSED: [f64; 7] = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0];
+
+#[tokio::test]
+async fn joint_angles_with_other_names_are_uploaded_after_a_choice_of_columns() {
+    let visit = Visit::begin().await;
+    let file = laboratory_angles(LEFT_ANKLE_REVERSED);
+    let common = [
+        ("walk", "1"),
+        ("format", "csv"),
+        ("recording", file.as_str()),
+        ("file_name", "visit 1.csv"),
+        ("cutoff_hz", "6"),
+    ];
+    let send = async |rest: &[(&str, &str)]| visit.submit("joint-angles", &[&common[..], rest].concat()).await;
+
+    let first = send(&[("button", "preview")]).await;
+    assert_eq!(first.status, StatusCode::OK, "{}", first.text);
+    for says in [
+        "<option selected>L Ankle</option>",
+        "<option value=\"degrees\" selected>",
+        "The unit was taken from the size of the angles.",
+        "The sign of one angle looks reversed.",
+        "Left ankle moves opposite to normal walking. Is its sign reversed?",
+        "gait cycle from left heel strike, %",
+    ] {
+        assert!(first.text.contains(says), "{says}: {}", first.text);
+    }
+    assert_eq!(first.text.matches("normal walking</span>").count(), 1, "one legend for every angle");
+    let reversed = [("unit", "degrees"), ("reversed_ankle_L", "on")];
+    let drawn = send(&[&CHOSEN[..], &reversed, &[("button", "columns")]].concat()).await;
+    assert!(!drawn.text.contains("looks reversed") && !drawn.text.contains("can be uploaded"), "{}", drawn.text);
+    assert!(drawn.text.contains("name=\"reversed_ankle_L\" value=\"on\" checked"), "{}", drawn.text);
+    let strides = send(&[&CHOSEN[..], &reversed, &[("button", "preview")]].concat()).await;
+    assert!(strides.text.contains("The recording can be uploaded: visit 1.csv."), "{}", strides.text);
+    assert_eq!(visit.files().await, json!([]), "nothing was uploaded");
+
+    // A reversed knee is an error of the file, which leaves the choice open.
+    let knee = [("unit", "degrees"), ("reversed_knee_L", "on")];
+    let refused = send(&[&CHOSEN[..], &knee, &[("button", "upload")]].concat()).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+    assert!(refused.text.contains("check the sign of the knee angle"), "{}", refused.text);
+    assert!(refused.text.contains("Left knee ranges from") && refused.text.contains("id=\"columns\""));
+    let twice = send(&[("column_knee_L", "L Knee"), ("column_knee_R", "L Knee"), ("unit", "degrees")]).await;
+    assert!(twice.text.contains("is chosen for both left knee and right knee"), "{}", twice.text);
+    let unknown = send(&[("column_elbow", "L Knee")]).await;
+    assert!(unknown.status.is_client_error() && unknown.text.contains("column_elbow"), "{}", unknown.text);
+
+    let uploaded = send(&[&CHOSEN[..], &reversed, &[("button", "upload")]].concat()).await;
+    assert_eq!(uploaded.status, StatusCode::SEE_OTHER, "{}", uploaded.text);
+
+    // A script does the same with the object `columns`, and gets the same limit cycles.
+    let of = |column: &str, reversed: bool| json!({"column": column, "reversed": reversed});
+    let columns = json!({
+        "torso": of("Trunk", false), "hip_L": of("L Hip", false), "knee_L": of("L Knee", false),
+        "ankle_L": of("L Ankle", true), "hip_R": of("R Hip", false), "knee_R": of("R Knee", false),
+        "ankle_R": of("R Ankle", false),
+    });
+    let with = |columns: &Value, unit: Value| {
+        // Another file, because a file belongs to one walk.
+        json!({"walk": 2, "recording": format!("# 2\n{file}"), "reading": {"columns": columns, "unit": unit}})
+    };
+    let kept = visit.upload("joint-angles", &with(&columns, json!("degrees"))).await;
+    assert_eq!(kept.status, StatusCode::CREATED, "{}", kept.text);
+    let cycles = visit.service.fetch(&format!("/api/v1{}/limit-cycles", visit.session)).await.items();
+    assert_eq!(cycles[0]["joints"].as_array().unwrap().len(), 7);
+    assert_eq!(cycles[0]["joints"], cycles[1]["joints"]);
+    let reference = ReferenceGait::builtin().unwrap();
+    let highest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let knee: Vec<f64> = serde_json::from_value(cycles[0]["joints"][2]["angle_rad"].clone()).unwrap();
+    let expected: Vec<f64> = reference.angles_rad.iter().map(|row| row[2]).collect();
+    assert!((highest(&knee) - highest(&expected)).abs() < 0.02, "degrees were read as degrees");
+    for (columns, unit, expected) in [
+        (&columns, Value::Null, "Give the unit of the angles"),
+        (&json!({"elbow": of("Trunk", false)}), json!("degrees"), "one of torso, hip_L"),
+        (&json!({"torso": of("Head", false)}), json!("degrees"), "column \"Head\" is missing"),
+    ] {
+        let refused = visit.upload("joint-angles", &with(columns, unit)).await;
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+        assert!(refused.json()["detail"].as_str().unwrap().contains(expected), "{expected}: {}", refused.text);
+    }
+    visit.service.stop().await;
+}
+
+#[tokio::test]
+async fn reference_gait_with_other_names_is_imported_after_a_choice_of_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
+    let before = service.fetch("/api/v1/reference-gaits").await.items();
+    let file = laboratory_angles(LEFT_ANKLE_REVERSED);
+    let common = [
+        ("name", "S03"),
+        ("format", "csv"),
+        ("strikes", "kinematics"),
+        ("recording", file.as_str()),
+        ("file_name", "S03.csv"),
+    ];
+    let chosen: Vec<(&str, &str)> = CHOSEN.into_iter().filter(|(name, _)| *name != "column_ankle_R").collect();
+    let send = async |rest: &[(&str, &str)]| {
+        let fields = [&common[..], rest].concat();
+        let fields = fields.iter().map(|(name, value)| format!("{name}={}", encoded(value)));
+        service.post_text("/reference-gaits", FORM, &fields.collect::<Vec<_>>().join("&")).await
+    };
+    let first = send(&[("button", "preview")]).await;
+    assert_eq!(first.status, StatusCode::OK, "{}", first.text);
+    assert!(first.text.contains("The sign of one angle looks reversed.") && !first.text.contains("Mean stride"));
+    let incomplete = send(&[("column_torso", "Trunk"), ("unit", "degrees"), ("button", "preview")]).await;
+    assert_eq!(incomplete.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", incomplete.text);
+    assert!(incomplete.text.contains("Choose a column for each of these angles: left hip (hip_L), left knee"));
+    assert!(incomplete.text.contains("id=\"columns\""), "{}", incomplete.text);
+    let reversed = [("unit", "degrees"), ("reversed_ankle_L", "on")];
+    let strides = send(&[&chosen[..], &reversed, &[("button", "preview")]].concat()).await;
+    assert!(strides.text.contains("The recording can be imported: S03.csv."), "{}", strides.text);
+    assert_eq!(service.fetch("/api/v1/reference-gaits").await.items(), before, "nothing was imported");
+    let imported = send(&[&chosen[..], &reversed, &[("button", "import")]].concat()).await;
+    assert_eq!(imported.status, StatusCode::SEE_OTHER, "{}", imported.text);
+    let page = service.fetch(imported.headers["location"].to_str().unwrap()).await.text;
+    assert!(page.contains("ankle_L = -L Ankle") && page.contains("angles in degrees"), "{page}");
+
+    let of = |column: &str, reversed: bool| json!({"column": column, "reversed": reversed});
+    let columns = json!({
+        "torso": of("Trunk", false), "hip_L": of("L Hip", false), "knee_L": of("L Knee", false),
+        "ankle_L": of("L Ankle", true), "hip_R": of("R Hip", false), "knee_R": of("R Knee", false),
+    });
+    let body = json!({"name": "S03", "format": "csv", "recording": file, "columns": columns, "unit": "degrees"});
+    let same = service.post("/api/v1/reference-gaits", &body).await;
+    assert_eq!(same.status, StatusCode::OK, "the same recording, read in the same way: {}", same.text);
+
+    let c3d = [("name", "S03"), ("recording", "x"), ("file_name", "S03.C3D"), ("button", "import")];
+    let fields = c3d.map(|(name, value)| format!("{name}={}", encoded(value))).join("&");
+    let refused = service.post_text("/reference-gaits", FORM, &fields).await;
+    assert!(refused.text.contains("C3D files are not read. Export the signals to CSV"), "{}", refused.text);
+    service.stop().await;
 }

@@ -28,6 +28,18 @@ fn with_strikes(chart: Chart, points: &[(f64, f64)], (name, colour, height): Foo
     chart.with(name, colour, Stroke::Points, marks)
 }
 
+/// A joint angle, °, over time with the range of normal walking.
+pub(crate) fn angle_over_time(title: &str, points: &[(f64, f64)], (low, high): (f64, f64)) -> Chart {
+    let chart = Chart::new(title, "time, s", "angle, °");
+    let chart = match points.first().zip(points.last()) {
+        Some(((first, _), (last, _))) => {
+            chart.with_band("range of normal walking", 7, vec![(*first, low, high), (*last, low, high)])
+        }
+        None => chart,
+    };
+    chart.with("this file", 0, Stroke::Solid, points.to_vec())
+}
+
 /// A column of a file as recorded, with the heel strikes of both feet. `threshold`: heel strikes are where the column rises
 /// above it.
 pub(crate) fn column_trace(

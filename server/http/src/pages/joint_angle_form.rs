@@ -1,5 +1,6 @@
 //! The form for joint angles of a walk in the lab, as typed.
 
+use super::angle_columns_form::AngleColumnFields;
 use super::form_numbers::{file_name, optional};
 use crate::refused_fields::{FieldLabels, TypedForm};
 use gaitwright_service::error::Error;
@@ -9,7 +10,7 @@ use serde::Deserialize;
 
 /// The form for joint angles, as typed.
 #[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub(super) struct JointAngleFields {
     pub(super) walk: u8,
     pub(super) format: MeasurementFormat,
@@ -17,22 +18,25 @@ pub(super) struct JointAngleFields {
     pub(super) unit: String,
     pub(super) cutoff_hz: String,
     pub(super) file_name: String,
-    /// `preview`, or else an upload.
+    /// `preview` or `columns`, or else an upload.
     pub(super) button: String,
+    #[serde(flatten)]
+    pub(super) columns: AngleColumnFields,
 }
 
 impl Default for JointAngleFields {
     fn default() -> Self {
         let JointAngleReading { format, cutoff_hz, .. } = JointAngleReading::default();
         let [recording, unit, file_name, button] = std::array::from_fn(|_| String::new());
-        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string(), file_name, button }
+        let columns = AngleColumnFields::default();
+        Self { walk: 0, format, recording, unit, cutoff_hz: cutoff_hz.to_string(), file_name, button, columns }
     }
 }
 
 impl JointAngleFields {
-    /// Whether the form asks for a preview only.
-    pub(super) fn previews(&self) -> bool {
-        self.button == "preview"
+    /// Whether the form asks for the upload.
+    pub(super) fn uploads(&self) -> bool {
+        !["preview", "columns"].contains(&self.button.as_str())
     }
 
     pub(super) fn read(&self) -> Result<NewJointAngles, Error> {
@@ -43,7 +47,8 @@ impl JointAngleFields {
             other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
         };
         let cutoff_hz = optional("cutoff_hz", &self.cutoff_hz)?.unwrap_or(JointAngleReading::default().cutoff_hz);
-        let reading = JointAngleReading { format: self.format, unit, cutoff_hz, file_name: file_name(&self.file_name) };
+        let (columns, file_name) = (self.columns.read()?, file_name(&self.file_name));
+        let reading = JointAngleReading { format: self.format, unit, columns, cutoff_hz, file_name };
         Ok(NewJointAngles { walk: self.walk, recording: self.recording.clone(), reading })
     }
 }
@@ -51,8 +56,9 @@ impl JointAngleFields {
 impl TypedForm for JointAngleFields {
     const LABELS: FieldLabels = &[
         ("walk", "Walk"),
-        ("unit", "Angle unit of an OpenSim file"),
+        ("unit", "Unit of the angles"),
         ("cutoff_hz", "Low-pass cut-off, Hz"),
+        ("columns", "Columns of the angles"),
         ("file_name", "File name"),
         ("recording", "File contents"),
     ];
@@ -60,6 +66,7 @@ impl TypedForm for JointAngleFields {
     fn repair(&mut self, field: &str) -> bool {
         match field {
             "unit" => self.unit.clear(),
+            "columns" => self.columns = AngleColumnFields::default(),
             "cutoff_hz" => self.cutoff_hz.clear(),
             _ => return false,
         }

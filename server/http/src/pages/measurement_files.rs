@@ -1,5 +1,6 @@
 //! Uploads of measurement files to a lab session, and the processing of its EMG recordings.
 
+use super::angle_columns_form::{ColumnsPage, unit_word};
 use super::emg_form::{EmgFields, EmgStep};
 use super::emg_signals::{self, SignalsPreview};
 use super::joint_angle_form::JointAngleFields;
@@ -15,6 +16,7 @@ use crate::page_error::PageError;
 use crate::refused_fields::{FormCheck, RefusedFields, TypedForm};
 use axum::extract::State;
 use axum::response::{IntoResponse, Response};
+use gait_optimizer::limit_cycle::JOINTS;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Caller, Run};
 use gaitwright_service::error::Error;
@@ -65,16 +67,28 @@ pub(super) async fn joint_angles(
     let mut check = FormCheck::new(&fields);
     let new = check.read(JointAngleFields::read)?;
     let mut forms = Forms { joint_angles: fields, open: "joint_angles", ..Forms::default() };
-    match new {
-        Some(new) if forms.joint_angles.previews() => match previewed_joint_angles(&mut app, new).await {
-            Ok(preview) => forms.joint_angle_preview = Some(preview),
-            Err(error) => refuse_file(&mut check, error)?,
-        },
-        Some(new) => match new.checked_wholly(app.store_mut()).await? {
-            Ok(checked) => keep(&app, &authorized, id, &mut check, &checked).await?,
-            Err(faults) => faults.into_iter().try_for_each(|fault| refuse_file(&mut check, fault))?,
-        },
-        None => {}
+    if let Some(new) = new {
+        if forms.joint_angles.uploads() {
+            match new.clone().checked_wholly(app.store_mut()).await? {
+                Ok(checked) => keep(&app, &authorized, id, &mut check, &checked).await?,
+                Err(faults) => faults.into_iter().try_for_each(|fault| refuse_file(&mut check, fault))?,
+            }
+        }
+        if !forms.joint_angles.uploads() || !check.is_clean() {
+            match joint_angle_page(&mut app, new, &forms.joint_angles).await {
+                Ok(page) => {
+                    if let Some((_, unit)) = &page.columns {
+                        forms.joint_angles.unit = (*unit).to_owned();
+                    }
+                    forms.joint_angle_columns = page.columns.map(|(columns, _)| columns);
+                    forms.joint_angle_preview = page.preview;
+                    if let Some(error) = page.refused {
+                        refuse_file(&mut check, error)?;
+                    }
+                }
+                Err(error) => refuse_file(&mut check, error)?,
+            }
+        }
     }
     answer(&mut app, id, &authorized.caller, check.into_refused(), forms).await
 }
@@ -96,7 +110,7 @@ async fn answer(
     refused: RefusedFields,
     forms: Forms,
 ) -> Result<Response, PageError> {
-    if forms.emg_step.is_some() || forms.joint_angle_preview.is_some() {
+    if forms.emg_step.is_some() || forms.joint_angle_columns.is_some() || forms.joint_angle_preview.is_some() {
         let status = refused.status();
         return Ok((status, lab_session::show(app, id, caller, forms, refused).await?).into_response());
     }
@@ -138,10 +152,44 @@ async fn emg_page(
     app.compute(draw).await?
 }
 
-/// Reads and draws the file of the form on the thread pool. Nothing is stored.
-async fn previewed_joint_angles(app: &mut AppState, new: NewJointAngles) -> Result<RecordingPreview, Error> {
-    app.compute(move |_: &OnPool| Ok(RecordingPreview::of_joint_angles(&new.preview()?, JointAngleFields::LABELS)))
-        .await?
+/// A step of the form for joint angles.
+struct JointAnglePage {
+    /// The columns and their unit, if they are chosen.
+    columns: Option<(ColumnsPage, &'static str)>,
+    preview: Option<RecordingPreview>,
+    /// Why there is no preview although the columns are chosen.
+    refused: Option<Error>,
+}
+
+/// Reads and draws the file of the form on the thread pool. Nothing is stored. Columns are chosen if the form asked for them, or
+/// if the file does not have the names of its format; the preview follows once they are.
+async fn joint_angle_page(
+    app: &mut AppState,
+    mut new: NewJointAngles,
+    fields: &JointAngleFields,
+) -> Result<JointAnglePage, Error> {
+    let (are_chosen, asks) = (fields.columns.are_asked_for(), fields.button == "columns");
+    let draw = move |_: &OnPool| {
+        if !are_chosen && !asks && !new.needs_columns() {
+            let preview = RecordingPreview::of_joint_angles(&new.preview()?, JointAngleFields::LABELS);
+            return Ok(JointAnglePage { columns: None, preview: Some(preview), refused: None });
+        }
+        let choice = new.column_choice()?;
+        let columns = (ColumnsPage::new(&choice, &JOINTS, &[])?, unit_word(choice.unit));
+        let mut page = JointAnglePage { columns: Some(columns), preview: None, refused: None };
+        if are_chosen && !asks {
+            new.reading.columns = choice.chosen;
+            new.reading.unit = Some(choice.unit.into());
+            match new.preview() {
+                Ok(preview) => {
+                    page.preview = Some(RecordingPreview::of_joint_angles(&preview, JointAngleFields::LABELS));
+                }
+                Err(error) => page.refused = Some(error),
+            }
+        }
+        Ok(page)
+    };
+    app.compute(draw).await?
 }
 
 /// Stores a file, if no field was refused.

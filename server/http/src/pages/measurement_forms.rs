@@ -1,5 +1,6 @@
 //! The forms of a lab session for measurement files and filter settings, to show a refused one again.
 
+use super::angle_columns_form::ColumnsPage;
 use super::emg_form::{EmgFields, EmgStep};
 use super::emg_signals::SignalsPreview;
 use super::form_numbers::number;
@@ -83,6 +84,8 @@ pub(super) struct Forms {
     pub(super) open: &'static str,
     /// The step of the form for EMG that the page shows; `None`: the first one.
     pub(super) emg_step: Option<EmgPage>,
+    /// The columns of the joint angles in the form, if they are chosen.
+    pub(super) joint_angle_columns: Option<ColumnsPage>,
     /// The preview of the joint angles in the form.
     pub(super) joint_angle_preview: Option<RecordingPreview>,
 }

@@ -2,6 +2,7 @@
 
 mod access_log;
 mod analysis;
+mod angle_columns_form;
 mod api_reference;
 mod audit;
 mod certainty;

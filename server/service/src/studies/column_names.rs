@@ -63,6 +63,11 @@ impl ColumnName {
         self.whole.contains(word)
     }
 
+    /// Whether a part of the name is one of these.
+    pub(super) fn has_part_of(&self, words: &[&str]) -> bool {
+        self.parts.iter().any(|part| words.contains(&part.as_str()))
+    }
+
     /// Whether a part of the name is this abbreviation, with or without a letter for the side before or after it.
     pub(super) fn abbreviates(&self, short: &str) -> bool {
         let is_side = |rest: &str| matches!(rest, "" | "l" | "r");

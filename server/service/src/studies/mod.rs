@@ -6,6 +6,8 @@
 
 pub mod actions_with_known_gait;
 pub mod analysis;
+pub mod angle_columns;
+pub mod angle_curves;
 pub mod answer_giver;
 pub mod archive;
 pub mod assessment_answer;

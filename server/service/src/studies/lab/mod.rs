@@ -29,7 +29,7 @@ pub use emg_overview::{ColumnTrace, EmgOverview};
 pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use emg_reading::EmgReading;
-pub use file_format::MeasurementFormat;
+pub use file_format::{C3D_FILE, MeasurementFormat, check_not_c3d};
 pub use foot_strikes::FootStrikes;
 pub use joint_angle_preview::JointAnglePreview;
 pub use measurement_results::{
