@@ -7,7 +7,7 @@ import sys
 import time
 from http import HTTPStatus
 from typing import TypeVar
-from uuid import UUID
+from uuid import UUID, uuid4
 
 from gaitwright_client import AuthenticatedClient as Client
 from gaitwright_client.api.access import create_token
@@ -25,6 +25,7 @@ from gaitwright_client.api.studies import (
 from gaitwright_client.api.subjects import create_subject, get_subject
 from gaitwright_client.api.trials import get_certificate, list_trials, request_certificate
 from gaitwright_client.models import (
+    AnswerSource,
     AskRequest,
     Bounds,
     Certificate,
@@ -33,10 +34,8 @@ from gaitwright_client.models import (
     Dimension,
     DimensionName,
     Evaluation,
-    AnswerSource,
     Job,
     JobState,
-    Label,
     MilestonePage,
     NewPreference,
     NewStudy,
@@ -48,6 +47,7 @@ from gaitwright_client.models import (
     PreferencePage,
     Problem,
     Recommendation,
+    ReportedLabel,
     SearchSpace,
     StudyState,
     StudyView,
@@ -108,7 +108,7 @@ def trials_of(client: Client, study: UUID) -> list[Trial]:
 
 def by_script(client: Client, subject: UUID) -> None:
     """A script evaluates every trial."""
-    new = NewStudy(subject_id=subject, name="python", evaluation=Evaluation.SCRIPT, number_of_trials=TRIALS)
+    new = NewStudy(subject_id=subject, evaluation=Evaluation.SCRIPT, number_of_trials=TRIALS)
     study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
         asked = ask_for_trial.sync_detailed(study.id, client=client, body=AskRequest(script="treadmill"))
@@ -117,9 +117,9 @@ def by_script(client: Client, subject: UUID) -> None:
         trial = given(Trial, asked.parsed)
         rmse = measure(trial.action)
         told = (
-            TellRequest(label=Label.NOT_CONVERGED, reason="the walker stumbled")
+            TellRequest(label=ReportedLabel.NOT_CONVERGED, reason="the walker stumbled")
             if rmse is None
-            else TellRequest(label=Label.CONVERGED, gait_rmse_rad=rmse)
+            else TellRequest(label=ReportedLabel.CONVERGED, gait_rmse_rad=rmse)
         )
         given(Trial, tell_result.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)
@@ -213,7 +213,7 @@ def main() -> None:
     scopes = [NewTokenScopesItem.READ, NewTokenScopesItem.RUN, NewTokenScopesItem.ANSWER]
     reply = create_token.sync_detailed(client=administrator, body=NewToken(name="python", scopes=scopes))
     client = Client(base_url=sys.argv[1], token=created(CreatedToken, "tokens", reply).secret)
-    new = NewSubject(pseudonym="python", height_m=1.75, body_mass_kg=70)
+    new = NewSubject(pseudonym=f"python-{uuid4().hex[:4]}", height_m=1.75, body_mass_kg=70)
     subject = created(Subject, "subjects", create_subject.sync_detailed(client=client, body=new))
     assert given(Subject, get_subject.sync(subject.id, client=client)) == subject
     by_script(client, subject.id)

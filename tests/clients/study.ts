@@ -74,7 +74,7 @@ async function waitUntil(id: string, ...states: State[]): Promise<State> {
 
 /** A script evaluates every trial. */
 async function byScript(subject_id: string): Promise<void> {
-  const body = { subject_id, name: "typescript", evaluation: "script" as const, number_of_trials: TRIALS };
+  const body = { subject_id, evaluation: "script" as const, number_of_trials: TRIALS };
   const { id } = created("studies", await client.POST("/api/v1/studies", { body }));
   for (;;) {
     const asked = await client.POST("/api/v1/studies/{id}/ask", {
@@ -189,7 +189,7 @@ client.use({
     request.headers.set("Authorization", `Bearer ${secret}`);
   },
 });
-const body = { pseudonym: "typescript", height_m: 1.75, body_mass_kg: 70 };
+const body = { pseudonym: `typescript-${crypto.randomUUID().slice(0, 4)}`, height_m: 1.75, body_mass_kg: 70 };
 const subject = created("subjects", await client.POST("/api/v1/subjects", { body }));
 const read = given(await client.GET("/api/v1/subjects/{id}", { params: { path: { id: subject.id } } }));
 check(JSON.stringify(read) === JSON.stringify(subject), read);

@@ -425,6 +425,22 @@ async fn text_is_compressed_unless_it_has_a_strong_entity_tag_or_is_a_stream() {
 }
 
 #[tokio::test]
+async fn long_refusal_is_encoded_as_its_header_says() {
+    let (_folder, service) = service().await;
+    let path = format!("/api/v1/studies?state={}", "a".repeat(2000));
+    for accepted in ["gzip", "identity"] {
+        let request = Request::get(&path).header("accept-encoding", accepted).body(Body::empty()).unwrap();
+        let answer = service.router().oneshot(request).await.unwrap();
+        assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
+        let says_gzip = answer.headers().get("content-encoding").is_some_and(|encoding| encoding == "gzip");
+        let body = axum::body::to_bytes(answer.into_body(), 1 << 20).await.unwrap();
+        assert_eq!(says_gzip, body.starts_with(&[0x1f, 0x8b]), "{accepted}");
+        assert_eq!(says_gzip, accepted == "gzip");
+    }
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn refused_study_form_is_shown_again_with_its_errors() {
     let (_folder, service) = service().await;
     let form = |height: &str, trials: &str| {

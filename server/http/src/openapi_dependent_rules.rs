@@ -24,7 +24,7 @@ const REFERENCE_FILE: &str = "A file in the format that `format` names, with its
                               joint angles over at least one whole stride of a walking person. It has all columns and heel \
                               strikes that are named in the request.";
 
-/// Component, field, and the rule.
+const STUDY_NAME: &str = "A name that no other study has, whatever its capitals and spaces.";
 const AUTHOR: &str = "The name of the signed-in user, unless `source` is `subject` or `script`.";
 const REPLACED: &str = "A person's answer to the same comparison in this study. It still counts, and is neither a rater's answer \
                         nor a safety report.";
@@ -35,7 +35,8 @@ const PARAMETER_RULES: [(&str, &str); 3] = [
     ("y", "A bound of the study's search space, and not that of `x`."),
 ];
 
-const RULES: [(&str, &str, &str); 33] = [
+/// Component, field, and the rule.
+const RULES: [(&str, &str, &str); 36] = [
     ("NewPreference", "replaces", REPLACED),
     ("NewAssessment", "replaces", REPLACED),
     ("NewPreference", "author", AUTHOR),
@@ -56,6 +57,9 @@ const RULES: [(&str, &str, &str); 33] = [
          that of the trial. If another trial already has these bounds, its gait is walkable and differs from \
          that of this trial.",
     ),
+    ("NewStudy", "name", STUDY_NAME),
+    ("StudyChange", "name", STUDY_NAME),
+    ("StudyClone", "name", STUDY_NAME),
     ("NewStudy", "subject_id", EXISTS),
     ("NewStudy", "device_id", EXISTS),
     ("NewStudy", "reference_gait_id", EXISTS),

@@ -44,7 +44,6 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
     };
     routes
-        .layer(compression::layer())
         .layer(middleware::from_fn(saved_as::name))
         .layer(middleware::from_fn(access_log_layer::add_caller))
         .layer(middleware::from_fn_with_state(state.clone(), authentication::identify))
@@ -59,6 +58,8 @@ pub fn with_layers(routes: Router<AppState>, state: AppState) -> Router {
         .layer(TraceLayer::new_for_http().make_span_with(|_: &Request| tracing::Span::current()).on_failure(()))
         .layer(middleware::from_fn_with_state(state.clone(), client_address::note))
         .layer(middleware::from_fn(responses::complete))
+        // Outside the layer above, which gives failures another body.
+        .layer(compression::layer())
         .layer(header(header::CONTENT_SECURITY_POLICY, CONTENT_SECURITY_POLICY))
         .layer(header(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
         .layer(header(header::REFERRER_POLICY, "same-origin"))
