@@ -9,7 +9,7 @@ use gaitwright_store::studies::StudyState;
 use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::callers::FORM;
-use gaitwright_tests::measured::electromyogram;
+use gaitwright_tests::measured::{electromyogram, laboratory_angles};
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -185,22 +185,14 @@ async fn first_step_without_heel_strikes_says_so_and_keeps_entries_of_later_step
     assert!(signals.text.contains("Heel strikes are unknown"), "{}", signals.text);
     assert!(signals.text.contains("<input type=\"hidden\" name=\"rejected_strides\" value=\"3\">"));
     assert!(signals.text.contains("<input type=\"hidden\" name=\"column_RF_L\" value=\"TA_L\">"));
-    visit.service.stop().await;
-}
 
-/// Eight strides of the built-in reference gait, 1.1 s each, in degrees: torso, left and right hip, knee and ankle.
-fn laboratory_angles(signs: [f64; 7]) -> String {
-    let reference = ReferenceGait::builtin().unwrap();
-    let mut text = "Time,Trunk,L Hip,L Knee,L Ankle,R Hip,R Knee,R Ankle\n".to_owned();
-    for row in 0..880 {
-        let time = f64::from(row) / 100.0;
-        write!(text, "{time}").unwrap();
-        for (angle, sign) in reference.seven_angles(time / 1.1).iter().zip(signs) {
-            write!(text, ",{:.6}", sign * angle.to_degrees()).unwrap();
-        }
-        text.push('\n');
-    }
-    text
+    // A refused entry can be corrected even if the file cannot be read.
+    let typed = [("rejected_strides", "two"), ("recording", "time_s,a\n0,x"), ("button", "upload")];
+    let refused = visit.submit("emg", &[&[("walk", "1"), ("format", "csv")][..], &typed].concat()).await;
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", refused.text);
+    assert!(refused.text.contains("name=\"rejected_strides\" value=\"two\" aria-invalid"), "{}", refused.text);
+    assert!(refused.text.contains("line 2, column 2"), "{}", refused.text);
+    visit.service.stop().await;
 }
 
 /// The choice of columns for a file of [`laboratory_angles`].
