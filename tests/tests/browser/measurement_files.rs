@@ -74,6 +74,7 @@ async fn browser_walks_through_the_steps_of_an_emg_recording_and_rejects_a_strid
     page.click("button[value=signals]").await;
     page.wait_for("button[value=muscles]").await;
     assert_eq!(page.text(".wizard [aria-current=step]").await, "Signals and heel strikes");
+    assert_eq!(page.value("document.activeElement.innerText").await, "Signals and heel strikes");
     let form = page.text("#upload-emg").await;
     assert!(form.contains("walk 1.csv, 7 columns") && form.contains("6 right heel strikes from column heel"), "{form}");
     assert_eq!(page.value("document.querySelector('#heel_strike_column').value").await, "heel");

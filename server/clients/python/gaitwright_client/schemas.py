@@ -743,6 +743,19 @@ class CertifiedSubject(TypedDict):
     height_m: float
 
 
+class _ChosenColumnRequired(TypedDict):
+    # Name of the column in the file.
+    column: str
+
+
+class ChosenColumn(_ChosenColumnRequired, total=False):
+    """The column of a joint angle."""
+
+    # Whether the sign of the column is opposite to that of the walker, in which forward lean, flexion and dorsiflexion
+    # are positive.
+    reversed: bool
+
+
 class _ConflictRequired(TypedDict):
     # The bounds. Empty if the fixed constraints conflict with each other.
     bounds: list[BoundValue]
@@ -1531,6 +1544,10 @@ class Job(TypedDict):
 class JointAngleReading(TypedDict, total=False):
     """How to read a file with joint angles."""
 
+    # Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R) of a file whose columns have other
+    # names or signs. Then the first column is the time, s, under any name; a CSV file needs `unit`; and hip angles are
+    # relative to the torso. If empty, the columns have the names of the format.
+    columns: dict[str, ChosenColumn]
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
     cutoff_hz: float
     # Name of the file, as it is shown.
@@ -2196,6 +2213,10 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
 
     # Body mass of the measured person, kg.
     body_mass_kg: Optional[float]
+    # Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R and, to find heel strikes from joint angles, knee_R) of
+    # a file whose columns have other names or signs. Then the first column is the time, s, under any name; a CSV file
+    # needs `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
+    columns: dict[str, ChosenColumn]
     # Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
     # `Treadmill_R_vy` for Camargo 2021.
     force_column: Optional[str]

@@ -1,6 +1,6 @@
 //! Imports reference gaits from recordings of joint angles. For pages, REST and the command line.
 
-use super::angle_columns::{self, ChosenColumns};
+use super::angle_columns::{self, ChosenColumn, ChosenColumns};
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_optimizer::ReferenceGait as Definition;
@@ -101,6 +101,7 @@ pub struct NewReferenceGait {
     /// file whose columns have other names or signs. Then the first column is the time, s, under any name; a CSV file needs
     /// `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
     #[serde(default)]
+    #[schema(value_type = BTreeMap<String, ChosenColumn>)]
     pub columns: ChosenColumns,
     /// Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
     /// `Treadmill_R_vy` for Camargo 2021.

@@ -102,10 +102,12 @@ impl NewEmg {
 }
 
 impl NewEmg {
-    /// Mean activity over the gait cycle with the default filters.
+    /// Mean activity over the gait cycle with the default filters, in the order of the traces.
     fn cycles(&self) -> Result<Vec<CycleActivity>, Error> {
         let (recording, strikes) = self.reading.read(WHAT, &self.recording)?;
-        Ok(recording.cycles(&self.reading.kept_strides(&strikes)?, &EmgSettings::default())?)
+        let mut cycles = recording.cycles(&self.reading.kept_strides(&strikes)?, &EmgSettings::default())?;
+        cycles.sort_by_key(|cycle| CHANNELS.iter().position(|channel| *channel == cycle.channel));
+        Ok(cycles)
     }
 }
 

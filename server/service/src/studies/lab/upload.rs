@@ -4,7 +4,7 @@ use super::emg_reading::EmgReading;
 use super::file_format::{MeasurementFormat, WHAT, check_file_name};
 use super::session::{checked_walk, still_open};
 use crate::error::{Error, FieldError};
-use crate::studies::angle_columns::{self, ChosenColumns};
+use crate::studies::angle_columns::{self, ChosenColumn, ChosenColumns};
 use crate::studies::reference_import::Unit;
 use gait_optimizer::ModelError;
 use gait_optimizer::angle_table::AngleTable;
@@ -44,6 +44,7 @@ pub struct JointAngleReading {
     /// Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R) of a file whose columns have other names
     /// or signs. Then the first column is the time, s, under any name; a CSV file needs `unit`; and hip angles are relative to
     /// the torso. If empty, the columns have the names of the format.
+    #[schema(value_type = BTreeMap<String, ChosenColumn>)]
     pub columns: ChosenColumns,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
     pub cutoff_hz: f64,
