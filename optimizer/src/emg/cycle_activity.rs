@@ -75,13 +75,13 @@ impl CycleActivity {
         }
         match &strides.left {
             Some(left) => Ok(Self { begins_at: CycleStart::LeftHeelStrike, ..Self::of_strides(envelope, left)? }),
-            None => Ok(Self::of_strides(envelope, &strides.right)?.from_assumed_left_heel_strike()),
+            None => Ok(Self::of_strides(envelope, &strides.right)?.over_assumed_left_cycle()),
         }
     }
 
     /// The same cycle from the left heel strike, if that is half a stride after the right one. The cycle is periodic: its
     /// start follows its end.
-    fn from_assumed_left_heel_strike(&self) -> Self {
+    fn over_assumed_left_cycle(&self) -> Self {
         let last = CYCLE_POINTS - 1;
         let later = |values: &[f64]| {
             let place = |point: usize| if point > last { point - last } else { point };

@@ -10,19 +10,21 @@ use utoipa::ToSchema;
 /// The heel strike at which the cycle of a channel begins: `right_heel_strike`; `left_heel_strike`, as recorded; or
 /// `assumed_left_heel_strike`, half a stride after the right one.
 #[derive(Debug, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
 pub(crate) enum CycleStart {
-    RightHeelStrike,
-    LeftHeelStrike,
-    AssumedLeftHeelStrike,
+    #[serde(rename = "right_heel_strike")]
+    Right,
+    #[serde(rename = "left_heel_strike")]
+    Left,
+    #[serde(rename = "assumed_left_heel_strike")]
+    AssumedLeft,
 }
 
 impl From<emg::CycleStart> for CycleStart {
     fn from(start: emg::CycleStart) -> Self {
         match start {
-            emg::CycleStart::RightHeelStrike => Self::RightHeelStrike,
-            emg::CycleStart::LeftHeelStrike => Self::LeftHeelStrike,
-            emg::CycleStart::AssumedLeftHeelStrike => Self::AssumedLeftHeelStrike,
+            emg::CycleStart::RightHeelStrike => Self::Right,
+            emg::CycleStart::LeftHeelStrike => Self::Left,
+            emg::CycleStart::AssumedLeftHeelStrike => Self::AssumedLeft,
         }
     }
 }

@@ -2,7 +2,7 @@
 //! reversed sign is seen.
 
 use super::angle_columns::{self, ChosenColumns};
-use super::lab::extremes;
+use super::signal_extremes::extremes;
 use crate::error::Error;
 use gait_optimizer::angle_table::{AngleColumn, AngleTable};
 use gait_optimizer::limit_cycle::JOINTS;
@@ -67,7 +67,7 @@ impl ColumnChoice {
         let doubts: Vec<Option<String>> = angles.iter().map(|(joint, angle)| doubtful_range(joint, angle)).collect();
         let is_certain =
             |joint: &&str| angles.iter().zip(&doubts).any(|((known, _), doubt)| known == joint && doubt.is_none());
-        let are_certain = OF_HEEL_STRIKES.iter().all(|joint| is_certain(&joint));
+        let are_certain = OF_HEEL_STRIKES.iter().all(is_certain);
         let strides = if given_s.is_empty() && !are_certain { Vec::new() } else { strides(&time_s, &angles, given_s) };
         let curve = |((joint, angle), doubt): (&(&'static str, Vec<f64>), &Option<String>)| {
             let cycle = mean_cycle(&time_s, angle, &strides);

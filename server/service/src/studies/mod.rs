@@ -71,6 +71,7 @@ pub mod sample_study;
 pub mod scheduler;
 pub mod seed;
 pub mod sensitivities;
+mod signal_extremes;
 mod simulated_walks;
 pub mod simulated_walks_setting;
 pub mod snapshot;

@@ -2,8 +2,8 @@
 //! strides between them, and their mean.
 
 use super::angle_curves::ColumnChoice;
-use super::lab::extremes;
 use super::reference_import::{FORCES, JointAngleFormat, NewReferenceGait, RECORDING};
+use super::signal_extremes::extremes;
 use crate::error::Error;
 use gait_optimizer::ReferenceGait as Definition;
 use gait_optimizer::reference::{AngleUnit, MotionRecording, RecordedStride};

@@ -1,10 +1,11 @@
 //! An overview of an EMG file before its columns are mapped to muscles: every column as recorded, and the heel strikes.
 
 use super::emg_guesses::{self, HeelStrikeColumn};
-use super::emg_preview::extremes_in;
 use super::file_format::WHAT;
+use super::foot_strikes::FootStrikes;
 use super::upload::NewEmg;
 use crate::error::Error;
+use crate::studies::signal_extremes::extremes_in;
 use std::collections::BTreeMap;
 
 /// How many intervals the trace of a column has. Each has its smallest and its largest sample.
@@ -57,7 +58,7 @@ impl NewEmg {
         }
         let (strikes, refused_strikes) = match reading.strikes(WHAT, &whole) {
             Ok(strikes) => (strikes, None),
-            Err(error) => (Default::default(), Some(error)),
+            Err(error) => (FootStrikes::default(), Some(error)),
         };
         let time = |sample: usize| whole.start_s + sample as f64 / whole.rate_hz;
         let trace = |(name, samples): &(String, Vec<f64>)| ColumnTrace {

@@ -4,11 +4,9 @@
 use super::file_format::WHAT;
 use super::upload::NewEmg;
 use crate::error::Error;
+use crate::studies::signal_extremes::extremes;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgSettings};
 use gait_optimizer::reference::{is_plausible, strides_between};
-
-/// How many intervals the trace of a channel has. Each has its smallest and its largest sample.
-const INTERVALS: usize = 400;
 
 /// A preview of an EMG recording.
 #[derive(Debug)]
@@ -111,36 +109,12 @@ impl NewEmg {
     }
 }
 
-/// The smallest and the largest sample of each interval, in order of time.
-pub(in crate::studies) fn extremes(samples: &[f64]) -> Vec<(usize, f64)> {
-    extremes_in(INTERVALS, samples)
-}
-
-/// The same for a number of intervals.
-pub(super) fn extremes_in(intervals: usize, samples: &[f64]) -> Vec<(usize, f64)> {
-    let length = samples.len().div_ceil(intervals).max(1);
-    let mut points = Vec::new();
-    for (interval, part) in samples.chunks(length).enumerate() {
-        let place = |best: fn(&f64, &f64) -> std::cmp::Ordering| {
-            part.iter()
-                .enumerate()
-                .max_by(|a, b| best(a.1, b.1))
-                .map(|(place, value)| (interval * length + place, *value))
-        };
-        let (low, high) = (place(|a, b| b.total_cmp(a)), place(f64::total_cmp));
-        let mut both: Vec<(usize, f64)> = low.into_iter().chain(high).collect();
-        both.sort_by_key(|(place, _)| *place);
-        both.dedup_by_key(|(place, _)| *place);
-        points.append(&mut both);
-    }
-    points
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, clippy::float_cmp)]
     use super::*;
     use crate::studies::lab::EmgReading;
+    use crate::studies::signal_extremes::INTERVALS;
     use std::fmt::Write;
 
     fn recording(strikes: Vec<f64>) -> NewEmg {

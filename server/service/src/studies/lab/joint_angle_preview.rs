@@ -1,11 +1,11 @@
 //! A preview of a recording of joint angles before it is stored: its angles over time, and the strides between right heel
 //! strikes, which are found from the joint angles.
 
-use super::emg_preview::extremes;
 use super::file_format::{MeasurementFormat, WHAT};
 use super::upload::{JointAngleReading, NewJointAngles};
 use crate::error::Error;
 use crate::studies::angle_curves::ColumnChoice;
+use crate::studies::signal_extremes::extremes;
 use gait_optimizer::limit_cycle::JointRecording;
 use gait_optimizer::reference::{HeelStrikes, MotionRecording, RecordedStride};
 

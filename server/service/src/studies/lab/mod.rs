@@ -26,7 +26,6 @@ mod upload;
 pub use controller_file_download::{GaitOfWalk, for_device};
 pub use emg_guesses::HeelStrikeColumn;
 pub use emg_overview::{ColumnTrace, EmgOverview};
-pub(super) use emg_preview::extremes;
 pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use emg_reading::EmgReading;
 pub use file_format::{C3D_FILE, MeasurementFormat, check_not_c3d};
