@@ -1,7 +1,7 @@
 //! Surface electromyograms (EMG): from raw signals to muscle activity over the gait cycle.
 //!
 //! 1. Zero-phase Butterworth band-pass, full-wave rectification, zero-phase Butterworth low-pass: [`Envelope`].
-//! 2. Segmentation at heel strikes, mean of the strides at 101 points, normalisation by the peak of normal walking:
+//! 2. Segmentation at the heel strikes of the leg of each channel, mean of the strides at 101 points, normalisation by the peak of normal walking:
 //!    [`CycleActivity`].
 //! 3. Distance from normal walking: [`emg_rmse`].
 
@@ -12,6 +12,7 @@ mod emg_recording;
 mod emg_rmse;
 mod envelope;
 mod filter_settings;
+mod leg_strides;
 mod model_activity;
 mod raw_signal_checks;
 
@@ -21,6 +22,7 @@ pub use emg_recording::{EmgRecording, HIGHEST_RATE_HZ};
 pub use emg_rmse::{EmgRmse, emg_rmse};
 pub use envelope::Envelope;
 pub use filter_settings::EmgSettings;
+pub use leg_strides::{CycleStart, LegStrides};
 pub use model_activity::{ModelActivity, model_activity};
 
 /// Channels of the experiment in the paper: rectus femoris, tibialis anterior, biceps femoris and gastrocnemius of the

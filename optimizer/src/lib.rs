@@ -5,6 +5,7 @@
 //! the gait, explains bounds without a gait, and reads recordings. It does no learning, storage or HTTP.
 
 pub mod activation_alternations;
+pub mod angle_table;
 pub mod body;
 mod cancel_token;
 pub mod certificate;

@@ -4,6 +4,7 @@
 //! differences. Unevenly spaced rows are first interpolated linearly on an even grid. The first and last samples have
 //! no central difference and are omitted.
 
+use crate::angle_table::{AngleColumn, AngleTable};
 use crate::model_error::ModelError;
 use crate::opensim_reading::{AngleUnit, StorageFile};
 use crate::reference::{LARGEST_ANGLE_RAD, MotionRecording};
@@ -23,9 +24,8 @@ const ROUNDING_S: f64 = 1e-9;
 /// Largest range of motion of a joint at rest, rad.
 const STILL_RAD: f64 = 0.05;
 
-/// The joints of the walker and their columns in Gaitwright's table. Forward lean, flexion and dorsiflexion are
-/// positive; hip angles are relative to the torso.
-pub const JOINTS: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
+pub use crate::reference::JOINTS;
+
 /// Each joint as a signed sum of columns of OpenSim's gait models. Hips and torso have two columns.
 const OPENSIM: [(&str, &[(&str, f64)]); 7] = [
     ("torso", &[("pelvis_tilt", -1.0), ("lumbar_extension", -1.0)]),
@@ -94,6 +94,30 @@ impl JointRecording {
             Some((joint, angles))
         };
         Self::whole(&file.table, OPENSIM.into_iter().filter_map(joint).collect())
+    }
+
+    /// Whether a CSV file has the names that [`Self::from_csv`] reads.
+    pub fn has_names_of_csv(file: &AngleTable) -> bool {
+        JOINTS.iter().any(|joint| file.has("time_s", &[&format!("{joint}_rad")]))
+    }
+
+    /// Whether an OpenSim file has the names that [`Self::from_opensim`] reads.
+    pub fn has_names_of_opensim(file: &AngleTable) -> bool {
+        OPENSIM.iter().any(|(_, columns)| columns.first().is_some_and(|(column, _)| file.has("time", &[column])))
+    }
+
+    /// The joints of a file whose columns were chosen.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] with line and column.
+    pub fn from_columns(file: &AngleTable, unit: AngleUnit, columns: &[AngleColumn<'_>]) -> Result<Self, ModelError> {
+        let mut joints = Vec::new();
+        for joint in JOINTS {
+            if let Some(column) = columns.iter().find(|column| column.joint == joint) {
+                joints.push((joint, file.angle(column, unit)?));
+            }
+        }
+        Self::whole(file.table(), joints)
     }
 
     fn whole(table: &Table, joints: Vec<(&'static str, Vec<f64>)>) -> Result<Self, ModelError> {

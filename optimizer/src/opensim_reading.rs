@@ -64,6 +64,11 @@ impl StorageFile {
         Ok(Self { table, unit, header_end: end + 1 })
     }
 
+    /// The unit of the angles in the header.
+    pub(crate) fn unit(&self) -> Option<AngleUnit> {
+        self.unit
+    }
+
     /// The unit of the angles: that of the header, or `unit` if the header has none. Both must agree.
     pub(crate) fn angle_unit(&self, what: &str, unit: Option<AngleUnit>) -> Result<AngleUnit, ModelError> {
         let silent = || {

@@ -29,6 +29,8 @@ pub(crate) struct Table {
 pub(crate) enum TimeColumn<'a> {
     /// The first column, which has this name, in s and strictly increasing.
     Column(&'a str),
+    /// The first column, whatever its name, in s and strictly increasing.
+    First,
     /// A constant number of rows per second, the first row at 0 s.
     Rate(f64),
 }
@@ -185,6 +187,11 @@ impl Table {
     /// Names of the columns, without the time.
     pub(crate) fn names(&self) -> &[String] {
         if self.rate_hz.is_some() { &self.names } else { &self.names[1..] }
+    }
+
+    /// Name of the first column, which has the time unless a constant rate gives it.
+    pub(crate) fn time_name(&self) -> &str {
+        self.names.first().map_or("", String::as_str)
     }
 
     /// Times of the rows, s.

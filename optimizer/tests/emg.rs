@@ -6,7 +6,9 @@ mod golden_gaits;
 mod noise;
 
 use gait_optimizer::ModelError;
-use gait_optimizer::emg::{CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope, emg_rmse, model_activity};
+use gait_optimizer::emg::{
+    CYCLE_POINTS, CycleActivity, CycleStart, EmgRecording, EmgSettings, Envelope, LegStrides, emg_rmse, model_activity,
+};
 use golden_gaits::golden_gait;
 use noise::noise;
 use serde_json::Value;
@@ -134,12 +136,43 @@ fn cycle_is_the_mean_of_complete_strides() {
     assert!(none.contains("no stride within the recording lasts 0.8 to 1.6 s"), "{none}");
 }
 
+/// The time since the last right heel strike, for strides of 1 s; 10 s at 1000 Hz.
+fn since_right_heel_strike(channel: &str) -> Envelope {
+    let values = (0..10_000).map(|k| f64::from(k % 1000) / 1000.0).collect();
+    Envelope { channel: channel.to_owned(), start_s: 0.0, rate_hz: 1000.0, values }
+}
+
+#[test]
+fn cycle_of_the_left_leg_begins_at_its_own_heel_strike() {
+    let right: Vec<(f64, f64)> = (0..8).map(|stride| (f64::from(stride), f64::from(stride) + 1.0)).collect();
+    let recorded = LegStrides {
+        left: Some(right.iter().map(|(start, end)| (start + 0.6, end + 0.6)).collect()),
+        right: right.clone(),
+    };
+    let assumed = LegStrides { right, left: None };
+    for (channel, strides, begins_at, begin) in [
+        ("TA_R", &recorded, CycleStart::RightHeelStrike, 0.0),
+        ("TA", &assumed, CycleStart::RightHeelStrike, 0.0),
+        ("TA_L", &recorded, CycleStart::LeftHeelStrike, 0.6),
+        ("TA_L", &assumed, CycleStart::AssumedLeftHeelStrike, 0.5),
+    ] {
+        let cycle = CycleActivity::of_leg(&since_right_heel_strike(channel), strides).unwrap();
+        assert_eq!((cycle.begins_at, cycle.strides, cycle.mean.len()), (begins_at, 8, CYCLE_POINTS));
+        // In the middle of what follows the strike, and after the next right heel strike.
+        for point in [0, 20, 90] {
+            let expected = (begin + point as f64 / 100.0) % 1.0;
+            assert!((cycle.mean[point] - expected).abs() < 2e-3, "{channel} {point}: {} {expected}", cycle.mean[point]);
+        }
+    }
+}
+
 fn flat(channel: &str, level: f64) -> CycleActivity {
     CycleActivity {
         channel: channel.to_owned(),
         mean: vec![level; CYCLE_POINTS],
         standard_deviation: vec![0.0; CYCLE_POINTS],
         strides: 1,
+        begins_at: CycleStart::RightHeelStrike,
     }
 }
 
@@ -255,4 +288,24 @@ fn model_activations_are_compared_with_channels_of_their_muscle() {
     same.mean.clone_from(&biceps.activation);
     let against_itself = model_activity(&gait, &same).unwrap();
     assert!(against_itself.rms_difference < 1e-12 && (against_itself.correlation.unwrap() - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn activation_of_a_left_muscle_begins_at_left_heel_strike_like_its_channel() {
+    let (_, gait) = golden_gait(1, true);
+    let left = gait.domains.iter().find(|domain| domain.name == "DS2_L").unwrap();
+    let from = |begins_at| CycleActivity { begins_at, ..flat("TA_L", 0.5) };
+    let recorded = model_activity(&gait, &from(CycleStart::LeftHeelStrike)).unwrap();
+    let first = left.muscles.as_ref().unwrap().activation[0][6];
+    assert!((recorded.activation[0] - first).abs() < 1e-6, "{} {first}", recorded.activation[0]);
+    let before = gait.domains.iter().take_while(|domain| domain.name != "DS2_L").last().unwrap();
+    let last = before.muscles.as_ref().unwrap().activation.last().unwrap()[6];
+    assert!((recorded.activation[100] - last).abs() < 1e-6, "{} {last}", recorded.activation[100]);
+    let assumed = model_activity(&gait, &from(CycleStart::AssumedLeftHeelStrike)).unwrap();
+    assert_eq!(assumed.activation, recorded.activation);
+    // A measurement that follows the model from left heel strike agrees with it there and nowhere else.
+    let same = |begins_at| CycleActivity { mean: recorded.activation.clone(), ..from(begins_at) };
+    let agrees = |begins_at| model_activity(&gait, &same(begins_at)).unwrap().correlation.unwrap();
+    assert!(agrees(CycleStart::LeftHeelStrike) > 0.999_999);
+    assert!(agrees(CycleStart::RightHeelStrike) < 0.9, "{}", agrees(CycleStart::RightHeelStrike));
 }

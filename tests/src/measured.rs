@@ -1,5 +1,6 @@
 //! Synthetic files like those of a motion laboratory.
 
+use gait_optimizer::ReferenceGait;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -41,6 +42,22 @@ pub fn four_strides(per_second: u32) -> String {
         let (left_hip, left_knee, ankle) =
             (0.2 - 0.4 * swing, 0.4 + 0.35 * swing, 0.05 + 0.1 * phase.sin() + 0.02 * time);
         writeln!(text, "{time},0.1,{left_hip:.6},{left_knee:.6},{ankle:.6},{hip:.6},{knee:.6}").unwrap();
+    }
+    text
+}
+
+/// Eight strides of the built-in reference gait, 1.1 s each, in degrees under names of a laboratory. `signs` are those of
+/// the torso and of the hip, knee and ankle of the left and of the right leg.
+pub fn laboratory_angles(signs: [f64; 7]) -> String {
+    let reference = ReferenceGait::builtin().unwrap();
+    let mut text = "Time,Trunk,L Hip,L Knee,L Ankle,R Hip,R Knee,R Ankle\n".to_owned();
+    for row in 0..880 {
+        let time = f64::from(row) / 100.0;
+        write!(text, "{time}").unwrap();
+        for (angle, sign) in reference.seven_angles(time / 1.1).iter().zip(signs) {
+            write!(text, ",{:.6}", sign * angle.to_degrees()).unwrap();
+        }
+        text.push('\n');
     }
     text
 }

@@ -607,7 +607,8 @@ async fn forms_of_a_session_report_every_refused_field() {
             assert!(refused.text.contains(says), "{button}: {says}: {}", refused.text);
         }
         if button == "upload" {
-            let columns = "Channel columns: columns &#34;RF_L&#34; (left rectus femoris) and &#34;TA_L&#34; (left tibialis anterior)";
+            let columns =
+                "Muscles: columns &#34;RF_L&#34; (left rectus femoris) and &#34;TA_L&#34; (left tibialis anterior)";
             assert!(refused.text.contains(columns), "{}", refused.text);
             assert!(refused.text.contains("Heel strike column: column &#34;nope&#34; is missing"), "{}", refused.text);
         }

@@ -245,6 +245,8 @@ fn known_to(path: &str, trials: &[TrialId]) -> BTreeMap<&'static str, Vec<Value>
         path if path.ends_with("/reference-gaits") => BTreeMap::from([
             ("recording", vec![json!(four_strides(100))]),
             ("format", vec![json!("csv")]),
+            // Names of columns are those of the file.
+            ("columns", vec![json!({})]),
             ("strikes", vec![json!("kinematics")]),
             ("forces", vec![Value::Null]),
             ("force_column", vec![Value::Null]),

@@ -7,7 +7,7 @@ const FORMATS = { csv: ["camargo", "csv"], mot: ["opensim"], sto: ["opensim"] };
 for (const field of document.querySelectorAll("[data-file]")) {
   const text = field.querySelector("textarea");
   const form = field.closest("form");
-  const kept = form.querySelector("[data-file-name]");
+  const kept = text.required ? form.querySelector("[data-file-name]") : null;
   const label = document.createElement("label");
   label.textContent = field.dataset.file || "Measurement file";
   const input = document.createElement("input");
@@ -25,6 +25,10 @@ for (const field of document.querySelectorAll("[data-file]")) {
 
   const load = async (file) => {
     if (!file) return;
+    if (file.name.toLowerCase().endsWith(".c3d")) {
+      shown.textContent = field.dataset.c3d;
+      return;
+    }
     text.value = await file.text();
     shown.textContent = `Loaded: ${file.name}, ${Math.ceil(file.size / 1000)} kB.`;
     if (!text.required) return;

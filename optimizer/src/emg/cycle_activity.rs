@@ -1,6 +1,7 @@
 //! Mean activity of a muscle over the gait cycle.
 
 use super::envelope::Envelope;
+use super::leg_strides::{CycleStart, LegStrides, is_left};
 use crate::model_error::ModelError;
 use crate::reference::{STRIDE_RANGE_S, is_plausible, strides_between};
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,9 @@ pub struct CycleActivity {
     pub standard_deviation: Vec<f64>,
     /// Number of strides.
     pub strides: usize,
+    /// The heel strike at which the cycle begins. Results stored without it begin at that of the right foot.
+    #[serde(default)]
+    pub begins_at: CycleStart,
 }
 
 impl CycleActivity {
@@ -56,7 +60,39 @@ impl CycleActivity {
             mean.push(middle);
             standard_deviation.push(if strides.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 });
         }
-        Ok(Self { channel: envelope.channel.clone(), mean, standard_deviation, strides: strides.len() })
+        let begins_at = CycleStart::RightHeelStrike;
+        Ok(Self { channel: envelope.channel.clone(), mean, standard_deviation, strides: strides.len(), begins_at })
+    }
+
+    /// The same over the strides of the leg of the channel. If left heel strikes were not recorded, they are taken to be
+    /// half a stride after the right ones.
+    ///
+    /// # Errors
+    /// As [`Self::cut`].
+    pub fn of_leg(envelope: &Envelope, strides: &LegStrides) -> Result<Self, ModelError> {
+        if !is_left(&envelope.channel) {
+            return Self::of_strides(envelope, &strides.right);
+        }
+        match &strides.left {
+            Some(left) => Ok(Self { begins_at: CycleStart::LeftHeelStrike, ..Self::of_strides(envelope, left)? }),
+            None => Ok(Self::of_strides(envelope, &strides.right)?.over_assumed_left_cycle()),
+        }
+    }
+
+    /// The same cycle from the left heel strike, if that is half a stride after the right one. The cycle is periodic: its
+    /// start follows its end.
+    fn over_assumed_left_cycle(&self) -> Self {
+        let last = CYCLE_POINTS - 1;
+        let later = |values: &[f64]| {
+            let place = |point: usize| if point > last { point - last } else { point };
+            (0..CYCLE_POINTS).filter_map(|point| values.get(place(point + last / 2))).copied().collect()
+        };
+        Self {
+            mean: later(&self.mean),
+            standard_deviation: later(&self.standard_deviation),
+            begins_at: CycleStart::AssumedLeftHeelStrike,
+            ..self.clone()
+        }
     }
 
     /// Largest mean activity over the cycle.

@@ -1,25 +1,16 @@
 //! The filters from a raw signal to an envelope: band-pass, rectification, low-pass.
 
-use super::{CycleActivity, EmgRecording, EmgSettings, Envelope};
+use super::{CycleActivity, EmgRecording, EmgSettings, Envelope, LegStrides};
 use crate::model_error::ModelError;
-use crate::reference::strides_between;
 use crate::signal_filter::{self, band_pass, low_pass};
 
 impl EmgRecording {
-    /// The mean gait cycle of each channel, segmented at heel strikes in s.
+    /// The mean gait cycle of each channel, over the strides of its leg.
     ///
     /// # Errors
-    /// As [`Self::envelopes`] and [`CycleActivity::cut`].
-    pub fn cycles(&self, heel_strikes_s: &[f64], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
-        self.cycles_of(&strides_between(heel_strikes_s), settings)
-    }
-
-    /// The mean gait cycle of each channel over given strides, s.
-    ///
-    /// # Errors
-    /// As [`Self::cycles`].
-    pub fn cycles_of(&self, strides: &[(f64, f64)], settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
-        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::of_strides(envelope, strides)).collect()
+    /// As [`Self::envelopes`] and [`CycleActivity::of_leg`].
+    pub fn cycles(&self, strides: &LegStrides, settings: &EmgSettings) -> Result<Vec<CycleActivity>, ModelError> {
+        self.envelopes(settings)?.iter().map(|envelope| CycleActivity::of_leg(envelope, strides)).collect()
     }
 
     /// The envelope of each channel.

@@ -1,6 +1,7 @@
 //! A recording of joint angles over several strides, converted to the convention of the walker.
 
 use super::reference_gait::{LARGEST_ANGLE_RAD, REFERENCE_COLUMNS};
+use crate::angle_table::{AngleColumn, AngleTable};
 use crate::model_error::ModelError;
 use crate::opensim_reading::{AngleUnit, StorageFile};
 use crate::statistics::extremes;
@@ -8,6 +9,8 @@ use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Index of the left knee among the angles of a reference gait.
 const KNEE: usize = 2;
+/// The columns of OpenSim's gait models without which a file is no reference gait.
+const OPENSIM_COLUMNS: [&str; 5] = ["pelvis_tilt", "hip_flexion_l", "knee_angle_l", "ankle_angle_l", "hip_flexion_r"];
 /// Smallest range of motion of a walking knee, rad. Radians taken for degrees are below.
 const SMALLEST_KNEE_RANGE_RAD: f64 = 0.1;
 /// Largest plausible angular velocity between two rows, rad/s. A knee in swing reaches about 7; marker noise adds to
@@ -124,6 +127,47 @@ impl MotionRecording {
         }
         let force = table.find("right_force_n").map(|force_n| VerticalForce { time_s: table.times(), force_n });
         Self::whole(what, &table, &angles, table.find("knee_R_rad"), force, steps)
+    }
+
+    /// Whether a file has the names that [`Self::from_csv`] reads.
+    pub fn has_names_of_csv(file: &AngleTable) -> bool {
+        file.has("time_s", &REFERENCE_COLUMNS)
+    }
+
+    /// Whether a file has the names that [`Self::from_opensim`] reads.
+    pub fn has_names_of_opensim(file: &AngleTable) -> bool {
+        file.has("time", &OPENSIM_COLUMNS)
+    }
+
+    /// Whether a file has the names that [`Self::from_camargo_csv`] reads.
+    pub fn has_names_of_camargo(file: &AngleTable) -> bool {
+        file.has("Header", &OPENSIM_COLUMNS)
+    }
+
+    /// The angles of a file whose columns were chosen. `force_column`, if given, is the vertical force under the right foot.
+    ///
+    /// # Errors
+    /// [`ModelError::Malformed`] for an angle without a column, or with line and column.
+    pub fn from_columns(
+        what: &str,
+        file: &AngleTable,
+        unit: AngleUnit,
+        columns: &[AngleColumn<'_>],
+        force_column: Option<&str>,
+    ) -> Result<Self, ModelError> {
+        let of_joint = |joint: &str| columns.iter().find(|column| column.joint == joint);
+        let mut angles = Vec::with_capacity(REFERENCE_COLUMNS.len());
+        for name in REFERENCE_COLUMNS {
+            let joint = name.trim_end_matches("_rad");
+            let column = of_joint(joint).ok_or_else(|| ModelError::Malformed {
+                what: "columns".to_owned(),
+                reason: format!("{joint} has no column"),
+            })?;
+            angles.push(file.angle(column, unit)?);
+        }
+        let knee_r_rad = of_joint("knee_R").map(|column| file.angle(column, unit)).transpose()?;
+        let force = force_column.map(|name| VerticalForce::of(file.table(), name)).transpose()?;
+        Self::whole(what, file.table(), &angles, knee_r_rad, force, file.steps(what, columns, unit))
     }
 
     /// Converts the columns of OpenSim's gait models: pelvis_tilt and lumbar_extension are positive backwards,

@@ -10,9 +10,12 @@ const FALISSE_2019_CSV: &str = include_str!("../../data/reference_gait_falisse_2
 /// The median of 24 healthy adults.
 const FUKUCHI_2018_CSV: &str = include_str!("../../data/reference_gait_fukuchi_2018.csv");
 /// Largest plausible joint angle, rad. Angles in degrees exceed it.
-pub(crate) const LARGEST_ANGLE_RAD: f64 = PI;
+pub const LARGEST_ANGLE_RAD: f64 = PI;
 /// Number of rows of a reference gait: 0, 1, ..., 100 % of the cycle.
 pub const REFERENCE_ROWS: usize = 101;
+/// The joints of the walker and their columns in Gaitwright's table. Forward lean, flexion and dorsiflexion are
+/// positive; hip angles are relative to the torso.
+pub const JOINTS: [&str; 7] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R", "knee_R", "ankle_R"];
 /// Names of the columns after the percentage.
 pub const REFERENCE_COLUMNS: [&str; 5] = ["torso_rad", "hip_L_rad", "knee_L_rad", "ankle_L_rad", "hip_R_rad"];
 /// Names of the optional columns of standard deviations.

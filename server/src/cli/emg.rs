@@ -7,10 +7,12 @@ use super::input_file::read;
 use super::out_file::OutFile;
 use super::output::data;
 use clap::Args;
-use gait_optimizer::emg::{Activity, CYCLE_POINTS, CycleActivity, EmgRecording, EmgSettings, Envelope};
+use gait_optimizer::emg::{
+    Activity, CYCLE_POINTS, CycleActivity, CycleStart, EmgRecording, EmgSettings, Envelope, LegStrides,
+};
 use gaitwright_charts::csv_table::{CsvCell, CsvTable};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::lab::{EmgReading, MeasurementFormat};
+use gaitwright_service::studies::lab::{EmgReading, FootStrikes, MeasurementFormat};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -35,12 +37,22 @@ pub(super) struct EmgCommand {
     /// Column of right heel strikes in both files: a switch under the heel, or the vertical force under the foot.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["heel_strikes_s", "normal_heel_strikes_s"])]
     heel_strike_column: Option<String>,
-    /// Value in the column of --heel-strike-column above which the foot is on the ground, in the unit of that column.
+    /// Value in the columns of heel strikes above which a foot is on the ground, in the unit of these columns.
     #[arg(long, value_name = "NUMBER", default_value = "0.5", value_parser = number, allow_negative_numbers = true)]
     heel_strike_threshold: f64,
     /// Times of right heel strikes in the recording, as in 0.41,1.52,2.63.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', value_parser = number, allow_negative_numbers = true)]
     heel_strikes_s: Vec<f64>,
+    /// Column of left heel strikes in both files. The cycle of the left leg begins with them (default: the left foot is
+    /// taken to strike half a stride after the right one).
+    #[arg(long, value_name = "NAME", conflicts_with = "left_heel_strikes_s")]
+    left_heel_strike_column: Option<String>,
+    /// Times of left heel strikes in the recording.
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', value_parser = number, allow_negative_numbers = true)]
+    left_heel_strikes_s: Vec<f64>,
+    /// Times of left heel strikes in the recording without the device.
+    #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", value_parser = number, allow_negative_numbers = true)]
+    normal_left_heel_strikes_s: Vec<f64>,
     /// Times of right heel strikes in the recording without the device.
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "normal", value_parser = number, allow_negative_numbers = true)]
     normal_heel_strikes_s: Vec<f64>,
@@ -97,14 +109,27 @@ fn channel(text: &str) -> Result<(String, String), String> {
 struct EmgResults {
     settings: EmgSettings,
     heel_strikes_s: Vec<f64>,
+    /// Absent if they were not recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    left_heel_strikes_s: Option<Vec<f64>>,
     #[serde(flatten)]
     activity: Activity,
+}
+
+/// Times of heel strikes that were given, s, with their flags.
+struct GivenStrikes<'a> {
+    right_s: (&'a [f64], &'static str),
+    left_s: (&'a [f64], &'static str),
 }
 
 impl EmgCommand {
     pub(super) fn run(self) -> Result<(), Error> {
         let settings = self.filters.settings();
-        let (recording, strikes) = self.read(&self.recording, (&self.heel_strikes_s, "--heel-strikes-s"))?;
+        let given = GivenStrikes {
+            right_s: (&self.heel_strikes_s, "--heel-strikes-s"),
+            left_s: (&self.left_heel_strikes_s, "--left-heel-strikes-s"),
+        };
+        let (recording, strikes, strides) = self.read(&self.recording, &given)?;
         let filters = [
             ("emg.band_low_hz", "--band-low-hz"),
             ("emg.band_high_hz", "--band-high-hz"),
@@ -112,15 +137,19 @@ impl EmgCommand {
             ("emg.order", "--order"),
         ];
         let envelopes = recording.envelopes(&settings).map_err(|error| of_flags(error, &filters))?;
-        let measured = recording.cycles(&strikes, &settings)?;
+        let measured = recording.cycles(&strides, &settings)?;
         let activity = match &self.normal {
             Some(path) => {
-                let (normal, strikes) = self.read(path, (&self.normal_heel_strikes_s, "--normal-heel-strikes-s"))?;
+                let given = GivenStrikes {
+                    right_s: (&self.normal_heel_strikes_s, "--normal-heel-strikes-s"),
+                    left_s: (&self.normal_left_heel_strikes_s, "--normal-left-heel-strikes-s"),
+                };
+                let (normal, _, strides) = self.read(path, &given)?;
                 if normal == recording {
                     let allowed = "a recording other than the one being processed";
                     return Err(Error::invalid("--normal", path.display().to_string(), allowed));
                 }
-                Activity::of_gait(&measured, &normal.cycles(&strikes, &settings)?)?
+                Activity::of_gait(&measured, &normal.cycles(&strides, &settings)?)?
             }
             None => Activity::of_normal_walking(&measured)?,
         };
@@ -134,7 +163,8 @@ impl EmgCommand {
         if let Some(out) = envelope_file {
             out.write(&envelopes_csv(&recording, envelopes))?;
         }
-        let found = EmgResults { settings, heel_strikes_s: strikes, activity };
+        let found =
+            EmgResults { settings, heel_strikes_s: strikes.right_s, left_heel_strikes_s: strikes.left_s, activity };
         if self.json {
             data(&serde_json::to_string_pretty(&found).map_err(|e| Error::Internal(e.to_string()))?)
         } else {
@@ -142,13 +172,16 @@ impl EmgCommand {
         }
     }
 
-    fn read(&self, path: &Path, (heel_strikes_s, flag): (&[f64], &str)) -> Result<(EmgRecording, Vec<f64>), Error> {
+    fn read(&self, path: &Path, given: &GivenStrikes<'_>) -> Result<(EmgRecording, FootStrikes, LegStrides), Error> {
+        let ((right_s, right_flag), (left_s, left_flag)) = (given.right_s, given.left_s);
         let reading = EmgReading {
             format: self.format,
             rate_hz: self.rate_hz,
             channels: self.channels.iter().cloned().collect(),
-            heel_strikes_s: heel_strikes_s.to_vec(),
+            heel_strikes_s: right_s.to_vec(),
             heel_strike_column: self.heel_strike_column.clone(),
+            left_heel_strikes_s: left_s.to_vec(),
+            left_heel_strike_column: self.left_heel_strike_column.clone(),
             heel_strike_threshold: self.heel_strike_threshold,
             ..EmgReading::default()
         };
@@ -156,13 +189,16 @@ impl EmgCommand {
             ("rate_hz", "--rate-hz"),
             ("reading.rate_hz", "--rate-hz"),
             ("reading.channels", "--channels"),
-            ("heel_strikes_s", flag),
-            ("reading.heel_strikes_s", flag),
+            ("heel_strikes_s", right_flag),
+            ("reading.heel_strikes_s", right_flag),
+            ("reading.left_heel_strikes_s", left_flag),
+            ("reading.left_heel_strike_column", "--left-heel-strike-column"),
         ];
         let found = reading.read(&path.display().to_string(), &read(path)?);
         let (recording, strikes) = found.map_err(|error| of_flags(error, &flags))?;
         recording.check_channels()?;
-        Ok((recording, strikes))
+        let strides = reading.kept_strides(&strikes)?;
+        Ok((recording, strikes, strides))
     }
 }
 
@@ -179,6 +215,9 @@ fn for_people(found: &EmgResults) -> String {
         let (name, peak) = (&channel.channel, channel.peak());
         let strides = if channel.strides == 1 { "1 stride".to_owned() } else { format!("{} strides", channel.strides) };
         lines.push(format!("{name}: average {average:.4}, peak {peak:.4}{distance} ({strides})"));
+    }
+    if channels.iter().any(|channel| channel.begins_at == CycleStart::AssumedLeftHeelStrike) {
+        lines.push("left heel strikes are taken to be half a stride after the right ones".to_owned());
     }
     lines.extend(emg_rmse.as_ref().map(|rmse| format!("total EMG RMSE: {:.4}", rmse.total)));
     lines.extend(emg_rmse.iter().flat_map(|rmse| rmse.warnings.iter().cloned()));

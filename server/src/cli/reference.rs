@@ -8,6 +8,7 @@ use super::out_file::OutFile;
 use super::output::{data, tell};
 use clap::Args;
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::angle_columns::ChosenColumns;
 use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use std::path::{Path, PathBuf};
 
@@ -57,6 +58,7 @@ impl ReferenceCommand {
             format: self.format,
             recording: read(&self.recording)?,
             unit: self.unit,
+            columns: ChosenColumns::new(),
             force_column: self.force_column,
             forces: self.forces.as_deref().map(read).transpose()?,
             strikes: self.strikes,

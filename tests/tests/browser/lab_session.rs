@@ -5,10 +5,7 @@ use crate::chromium::{Chromium, Tab};
 use crate::site::Site;
 use gaitwright_store::lab_sessions;
 use gaitwright_store::studies::StudyState;
-use gaitwright_store::trials::TrialState;
 use gaitwright_tests::analytic::Analytic;
-use gaitwright_tests::measured::electromyogram;
-use serde_json::json;
 
 /// The findings of axe-core on the current page, if axe-core is installed.
 async fn is_for_everybody(axe: Option<&Axe>, page: &Tab, what: &str) {
@@ -93,45 +90,6 @@ async fn browser_completes_a_lab_session_from_plan_to_unblinding() {
     page.wait_for(".answers").await;
     let expected = format!("trial {} is better than trial {}", number(third), number(second));
     assert!(page.text(".answers").await.contains(&expected), "{}", page.text(".answers").await);
-    page.is_clean(&site.origin).await;
-    browser.close().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn browser_previews_an_emg_recording_and_rejects_a_stride() {
-    let Some(browser) = Chromium::launch().await else { return };
-    let axe = Axe::find();
-    let site = Site::start(Analytic::default()).await;
-    let study = site.service.study(|new| new.number_of_trials = 12).await;
-    site.service.wait_for(study, &[StudyState::Finished]).await;
-    let trials = site.service.trials(study).await;
-    let mut gaits = trials.iter().filter(|trial| trial.state == TrialState::Converged);
-    let gaits = json!({"trial_a": gaits.next().unwrap().id, "trial_b": gaits.next().unwrap().id});
-    let session = site.service.post(&format!("/api/v1/studies/{study}/lab-sessions"), &gaits).await.json();
-    let session = session["id"].as_str().unwrap();
-    site.service.post(&format!("/api/v1/lab-sessions/{session}/walks"), &json!({"walk": 1})).await;
-    let page = browser.open(&site.at(&format!("/lab-sessions/{session}"))).await;
-    page.run("for (const d of document.querySelectorAll('details')) d.open = true").await;
-    // A file that is dropped fills in the text, its name and its format.
-    page.run(&format!(
-        "const moved = new DataTransfer(); moved.items.add(new File([{}], 'walk 1.csv')); \
-         document.querySelector('#emg_format').value = 'opensim'; \
-         document.querySelector('form[action$=emg] .drop').dispatchEvent(new DragEvent('drop', {{ dataTransfer: moved, bubbles: true, cancelable: true }}))",
-        json!(electromyogram(1.0))
-    ))
-    .await;
-    page.wait_until("document.querySelector('#emg_recording').value.length > 1000").await;
-    page.wait_until("document.querySelector('#emg_format').value === 'csv'").await;
-    page.fill("#heel_strike_column", "heel").await;
-    page.click("button[value=preview]").await;
-    page.wait_for("#preview").await;
-    let preview = page.text("#preview").await;
-    assert!(preview.contains("The recording can be uploaded: walk 1.csv"), "{preview}");
-    is_for_everybody(axe.as_ref(), &page, "a preview").await;
-    page.click("[data-strides] tbody tr:nth-child(2) input").await;
-    page.wait_until("document.querySelector('#rejected_strides').value === '2'").await;
-    page.click("button[value=upload]").await;
-    page.wait_until("[...document.querySelectorAll('main td a')].some(a => a.innerText === 'walk 1.csv')").await;
     page.is_clean(&site.origin).await;
     browser.close().await;
 }

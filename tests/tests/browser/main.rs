@@ -11,6 +11,7 @@ mod gait;
 mod lab;
 mod lab_session;
 mod lists;
+mod measurement_files;
 mod program;
 mod rater;
 mod sign_in;

@@ -4,7 +4,7 @@ use super::group::Group;
 use super::leg_cycle::{Cycle, Leg, Look};
 use super::legs::{CYCLE, JOINTS, cycle_of_leg};
 use super::overlaid_gait::{OverlaidGait, named, overlaid};
-use super::reference_curve::{band_in_words, cycle_of, with_curve};
+use super::reference_curve::{band_in_words, cycle_of, from_own_heel_strike, with_curve};
 use crate::{Chart, Stroke};
 use gait_optimizer::{Gait, ReferenceGait};
 
@@ -131,6 +131,34 @@ fn charts_of_several(gaits: &[OverlaidGait<'_>], reference: &ReferenceGait) -> V
     every_angle().map(draw).collect()
 }
 
+/// The curves of a reference gait beside which a measured angle of each joint is drawn: column, the leg over whose cycle the
+/// reference has it, and the leg of the joint. Right knee and ankle have the curves of the left ones.
+const MEASURED: [(usize, Leg, Leg); 7] = [
+    (0, Leg::Right, Leg::Right),
+    (1, Leg::Left, Leg::Left),
+    (2, Leg::Left, Leg::Left),
+    (3, Leg::Left, Leg::Left),
+    (4, Leg::Right, Leg::Right),
+    (2, Leg::Left, Leg::Right),
+    (3, Leg::Left, Leg::Right),
+];
+
+/// A measured angle, °, over the cycle of its leg beside a reference gait. `joint` is its place among the joints of the walker,
+/// and `from_right_heel_strike` has a value for each percent of the stride.
+pub fn measured_beside_reference(
+    title: &str,
+    joint: usize,
+    from_right_heel_strike: &[f64],
+    reference: &ReferenceGait,
+) -> Option<Chart> {
+    let (column, of_reference, leg) = *MEASURED.get(joint)?;
+    let chart = chart(title, &format!("gait cycle from {} heel strike, %", leg.name()));
+    let look = Look { label: "normal walking", colour: REFERENCE, stroke: Stroke::Dotted };
+    let chart = with_curve(chart, reference, (column, of_reference), &look, Some(ONE_DEVIATION));
+    let measured = from_own_heel_strike(leg, from_right_heel_strike);
+    Some(chart.with("this file", 0, Stroke::Solid, measured))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -187,5 +215,20 @@ mod tests {
         let expected =
             "Left hip, Right hip, Left knee, Right knee (prosthesis), Left ankle, Right ankle (prosthesis), Torso lean";
         assert_eq!(titles.join(", "), expected);
+    }
+
+    #[test]
+    fn measured_angles_are_drawn_over_the_cycle_of_their_leg_like_the_reference() {
+        let reference = ReferenceGait::builtin().unwrap();
+        for joint in 0..7 {
+            let angle = |row: usize| reference.seven_angles(row as f64 / 100.0)[joint].to_degrees();
+            let measured: Vec<f64> = (0..REFERENCE_ROWS).map(angle).collect();
+            let chart = measured_beside_reference("", joint, &measured, &reference).unwrap();
+            let [normal, file] = &chart.series[..] else { panic!("{:?}", chart.series) };
+            let differ = normal.points.iter().zip(&file.points).map(|(a, b)| (a.1 - b.1).abs()).fold(0.0, f64::max);
+            // The stride of the built-in gait is not closed exactly.
+            assert!(differ < 1.0 && file.points.len() == REFERENCE_ROWS, "joint {joint}: {differ}");
+        }
+        assert!(measured_beside_reference("", 7, &[], &reference).is_none());
     }
 }

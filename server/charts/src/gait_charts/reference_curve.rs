@@ -14,6 +14,15 @@ fn first_row(leg: Leg) -> usize {
     }
 }
 
+/// A curve over the cycle of a leg, with percent: what comes before its heel strike follows the end of the stride. The left foot
+/// is taken to strike like that of a reference gait.
+pub(super) fn from_own_heel_strike(leg: Leg, from_right_heel_strike: &[f64]) -> Vec<(f64, f64)> {
+    let last = REFERENCE_ROWS - 1;
+    let place = |row: usize| if row > last { row - last } else { row };
+    let value = |percent: usize| from_right_heel_strike.get(place(first_row(leg) + percent)).copied();
+    (0..=last).filter_map(|percent| Some((percent as f64, value(percent)?))).collect()
+}
+
 /// Adds one coordinate of a reference gait, over the cycle of a leg. `band` is the name of its band; `None`: without one.
 pub(super) fn with_curve(
     chart: Chart,

@@ -49,6 +49,10 @@ ConsentKind = Literal["given", "withdrawn"]
 # A contact point of the foot.
 ContactPoint = Literal["heel", "toe"]
 
+# The heel strike at which the cycle of a channel begins: `right_heel_strike`; `left_heel_strike`, as recorded; or
+# `assumed_left_heel_strike`, half a stride after the right one.
+CycleStart = Literal["right_heel_strike", "left_heel_strike", "assumed_left_heel_strike"]
+
 # Identifier of a device.
 DeviceId = str
 
@@ -739,6 +743,19 @@ class CertifiedSubject(TypedDict):
     height_m: float
 
 
+class _ChosenColumnRequired(TypedDict):
+    # Name of the column in the file.
+    column: str
+
+
+class ChosenColumn(_ChosenColumnRequired, total=False):
+    """The column of a joint angle."""
+
+    # Whether the sign of the column is opposite to that of the walker, in which forward lean, flexion and dorsiflexion
+    # are positive.
+    reversed: bool
+
+
 class _ConflictRequired(TypedDict):
     # The bounds. Empty if the fixed constraints conflict with each other.
     bounds: list[BoundValue]
@@ -982,6 +999,9 @@ class CurrentUser(TypedDict):
 class CycleActivity(TypedDict):
     """Activity of a channel at 0, 1, ..., 100 % of the gait cycle, mean over strides."""
 
+    # Heel strike at which the cycle begins: that of the leg of the channel. Results stored without this value begin at
+    # right heel strike.
+    begins_at: CycleStart
     # Name of the channel.
     channel: str
     # Mean over strides, relative to the peak of walk 1.
@@ -1130,13 +1150,19 @@ class EmgReading(TypedDict, total=False):
     format: MeasurementFormat
     # Column of a switch under the right heel, or of the vertical force under the right foot.
     heel_strike_column: Optional[str]
-    # Value of `heel_strike_column`, in the unit of the column, above which the foot is on the ground.
+    # Value of the columns of heel strikes, in their unit, above which a foot is on the ground.
     heel_strike_threshold: float
     # Times of right heel strikes, s, on the time axis of the file. If empty, they are detected in `heel_strike_column`.
     heel_strikes_s: list[float]
+    # Column of a switch under the left heel, or of the vertical force under the left foot.
+    left_heel_strike_column: Optional[str]
+    # Times of left heel strikes, s. The cycle of the left leg begins with them. If neither these times nor
+    # `left_heel_strike_column` are given, the left foot is taken to strike half a stride after the right one.
+    left_heel_strikes_s: list[float]
     # Sampling rate of a CSV file without a `time_s` column, Hz.
     rate_hz: Optional[float]
-    # Numbers of the strides to leave out, counted from 1 in the order of the heel strikes.
+    # Numbers of the strides to leave out, counted from 1 in the order of the right heel strikes. Strides of the left
+    # leg that overlap with them are left out too.
     rejected_strides: list[int]
 
 
@@ -1518,6 +1544,10 @@ class Job(TypedDict):
 class JointAngleReading(TypedDict, total=False):
     """How to read a file with joint angles."""
 
+    # Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R) of a file whose columns have other
+    # names or signs. Then the first column is the time, s, under any name; a CSV file needs `unit`; and hip angles are
+    # relative to the torso. If empty, the columns have the names of the format.
+    columns: dict[str, ChosenColumn]
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
     cutoff_hz: float
     # Name of the file, as it is shown.
@@ -2183,6 +2213,10 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
 
     # Body mass of the measured person, kg.
     body_mass_kg: Optional[float]
+    # Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R and, to find heel strikes from joint angles, knee_R) of
+    # a file whose columns have other names or signs. Then the first column is the time, s, under any name; a CSV file
+    # needs `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
+    columns: dict[str, ChosenColumn]
     # Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
     # `Treadmill_R_vy` for Camargo 2021.
     force_column: Optional[str]
@@ -3533,8 +3567,8 @@ class WalkActivity(TypedDict):
 
     # Mean of each channel over the cycle, relative to the peak of walk 1.
     averages: list[float]
-    # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
-    # the peak of walk 1.
+    # Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from the heel strike of its leg,
+    # relative to the peak of walk 1.
     channels: list[CycleActivity]
     # EMG RMSE against walk 1, in total and for each channel. Null for walk 1.
     emg_rmse: Optional[EmgRmse]

@@ -1,13 +1,12 @@
 //! The charts of a lab session: muscle activity over the cycle, limit cycles.
 
 use gait_optimizer::Gait;
-use gait_optimizer::emg::{CHANNELS, CycleActivity, muscle_of};
+use gait_optimizer::emg::{CHANNELS, CycleActivity, CycleStart, muscle_of};
 use gait_optimizer::limit_cycle::JOINTS;
 use gaitwright_charts::gait_charts;
 use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_service::studies::lab::{EmgView, LabSessionView, LimitCycles, WalkCondition};
 
-const CYCLE: &str = "gait cycle from right heel strike, %";
 /// Names of the joints, in the order of [`JOINTS`] and of the gait's coordinates after the hip position.
 const JOINT_NAMES: [&str; 7] =
     ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip", "Right knee", "Right ankle"];
@@ -38,6 +37,14 @@ pub(crate) fn joint_name(joint: &str) -> &str {
     JOINTS.iter().zip(JOINT_NAMES).find(|(known, _)| **known == joint).map_or(joint, |(_, name)| name)
 }
 
+/// The axis of a channel.
+fn cycle(activity: &CycleActivity) -> &'static str {
+    match activity.begins_at {
+        CycleStart::RightHeelStrike => "gait cycle from right heel strike, %",
+        CycleStart::LeftHeelStrike | CycleStart::AssumedLeftHeelStrike => "gait cycle from left heel strike, %",
+    }
+}
+
 /// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation
 /// of each walk, and the activation of the model after unblinding.
 pub(crate) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
@@ -45,7 +52,7 @@ pub(crate) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
     let chart = |(place, channel): (usize, &CycleActivity)| {
         let mut chart = Chart::new(
             &format!("EMG, {}", muscle_name(&channel.channel)),
-            CYCLE,
+            cycle(channel),
             "share of the peak without the device",
         );
         for walk in &emg.result.walks {
@@ -69,6 +76,20 @@ pub(crate) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
         Figure::chart("", chart)
     };
     normal.channels.iter().enumerate().map(chart).collect()
+}
+
+/// Mean muscle activity over the gait cycle of a file that is not stored yet, in the unit of the file.
+pub(crate) fn cycles_of_file(cycles: &[CycleActivity]) -> Vec<Chart> {
+    let chart = |activity: &CycleActivity| {
+        let title = format!("EMG, {}", muscle_name(&activity.channel));
+        let points = activity.mean.iter().zip(&activity.standard_deviation).enumerate();
+        let band = points.clone().map(|(point, (mean, sd))| (point as f64, mean - sd, mean + sd)).collect();
+        let mean = points.map(|(point, (mean, _))| (point as f64, *mean)).collect();
+        Chart::new(&title, cycle(activity), "activity, in the unit of the file")
+            .with_band("one standard deviation", 0, band)
+            .with("mean of the strides", 0, Stroke::Solid, mean)
+    };
+    cycles.iter().map(chart).collect()
 }
 
 /// The colour and stroke of a walk.

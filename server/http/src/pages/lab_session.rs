@@ -1,6 +1,8 @@
 //! The page of a lab session with its walks and measurements.
 
-use super::measurement_forms::{EmgFields, FilterFields, Forms, JointAngleFields};
+use super::emg_form::{EmgFields, EmgStep};
+use super::joint_angle_form::JointAngleFields;
+use super::measurement_forms::{FilterFields, Forms};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;
 use crate::accessible::Id;
@@ -15,7 +17,7 @@ use crate::visible::Visible;
 use askama::Template;
 use axum::extract::State;
 use axum::response::{IntoResponse, Redirect, Response};
-use gait_optimizer::emg::{CycleActivity, EmgSettings};
+use gait_optimizer::emg::{CycleActivity, CycleStart, EmgSettings};
 use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
@@ -126,8 +128,9 @@ impl MeasuredActivity {
         Self {
             how: format!(
                 "Band-pass {band_low_hz} to {band_high_hz} Hz, rectified, low-pass {envelope_hz} Hz, order {order}, all \
-                 zero-phase. Means of {}. Values are relative to the muscle's peak without the device.",
-                counts.join(", ")
+                 zero-phase. Means of {}. Values are relative to the muscle's peak without the device. {}",
+                counts.join(", "),
+                left_strikes(session, &emg.result.walks),
             ),
             compared: compared.iter().map(|(walk, _)| name(walk)).collect(),
             warnings: compared
@@ -141,6 +144,29 @@ impl MeasuredActivity {
             legend,
         }
     }
+}
+
+/// A sentence about the heel strikes from which the cycles of the left leg begin.
+fn left_strikes(session: &LabSessionView, walks: &[WalkActivity]) -> String {
+    let begins_so = |walk: &&WalkActivity, start| walk.channels.iter().any(|channel| channel.begins_at == start);
+    let are_from_right =
+        |walk: &&WalkActivity| walk.channels.iter().all(|c| c.begins_at == CycleStart::RightHeelStrike);
+    if walks.iter().all(|walk| are_from_right(&walk)) {
+        return "Every cycle begins at right heel strike.".to_owned();
+    }
+    let assumed: Vec<String> = walks
+        .iter()
+        .filter(|walk| begins_so(walk, CycleStart::AssumedLeftHeelStrike))
+        .map(|walk| lab_charts::walk_name(session, walk.walk))
+        .collect();
+    let begin = "Each cycle begins at the heel strike of its leg.";
+    if assumed.is_empty() {
+        return begin.to_owned();
+    }
+    format!(
+        "{begin} Left heel strikes were not recorded ({}); they are taken to be half a stride after the right ones.",
+        assumed.join(", ")
+    )
 }
 
 /// A trial and its number.

@@ -2,6 +2,7 @@
 
 mod access_log;
 mod analysis;
+mod angle_columns_form;
 mod api_reference;
 mod audit;
 mod certainty;
@@ -11,8 +12,11 @@ mod compare_answer;
 mod device_form;
 mod devices;
 mod disk_space_notice;
+mod emg_form;
+mod emg_signals;
 mod explanation;
 mod figures;
+mod form_numbers;
 mod gait;
 mod gait_forms;
 mod gait_overlay;
@@ -20,6 +24,7 @@ mod gait_summary;
 mod help;
 mod home;
 mod jobs;
+mod joint_angle_form;
 mod joint_peaks;
 mod lab_session;
 mod lab_sessions;

@@ -24,8 +24,9 @@ pub(super) struct RecordingPreview {
     pub(super) strides: Vec<StrideRow>,
     /// Whether strides can be rejected in the form.
     pub(super) can_reject: bool,
-    /// The mean stride, and the legend of its charts.
+    /// The mean of the strides, its heading, and the legend of its charts.
     pub(super) mean: Vec<PageChart>,
+    pub(super) mean_heading: &'static str,
     pub(super) mean_legend: Vec<(String, String)>,
 }
 
@@ -55,6 +56,7 @@ impl RecordingPreview {
             strides: strides.iter().enumerate().map(row).collect(),
             can_reject: false,
             mean: Vec::new(),
+            mean_heading: "Mean stride",
             mean_legend: Vec::new(),
         }
     }
@@ -84,7 +86,10 @@ impl RecordingPreview {
             Stride { .. } => "used",
         };
         let refused = in_words(&preview.refused, labels);
-        Self { refused, can_reject: true, ..Self::new(&charts, &strides, usage) }
+        let mut mean: Vec<PageChart> = lab_charts::cycles_of_file(&preview.cycles).iter().map(PageChart::new).collect();
+        let mean_legend = shared_legend(&mut mean);
+        let mean_heading = "Result: mean activity over the gait cycle";
+        Self { refused, can_reject: true, mean, mean_heading, mean_legend, ..Self::new(&charts, &strides, usage) }
     }
 
     /// Joint angles of a walk in the lab.

@@ -1,5 +1,7 @@
 //! The pages of reference gaits: the list with the import form, and each one with its curves.
 
+use super::angle_columns_form::{AngleColumnFields, ColumnsPage, OF_REFERENCE, USED_BY_REFERENCE, unit_word};
+use super::form_numbers;
 use super::page_chart::{PageChart, shared_legend};
 use super::recording_preview::RecordingPreview;
 use crate::AppState;
@@ -17,6 +19,7 @@ use axum::response::{IntoResponse, Redirect, Response};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
+use gaitwright_service::studies::lab::check_not_c3d;
 use gaitwright_service::studies::nearest_reference::{self, ReferenceGaitMatch};
 use gaitwright_service::studies::reference_import::{self, JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use gaitwright_store::reference_gaits::{self, ReferenceGaitRow};
@@ -27,7 +30,7 @@ use std::str::FromStr;
 
 /// The fields as typed, to show a refused form again.
 #[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub(super) struct ReferenceGaitFields {
     name: String,
     format: JointAngleFormat,
@@ -41,8 +44,12 @@ pub(super) struct ReferenceGaitFields {
     body_mass_kg: String,
     /// The units in which the form was shown.
     units: Units,
-    /// `preview`, or else an import.
+    /// Shown beside the preview, not stored.
+    file_name: String,
+    /// `preview` or `columns`, or else an import.
     button: String,
+    #[serde(flatten)]
+    columns: AngleColumnFields,
 }
 
 impl ReferenceGaitFields {
@@ -58,6 +65,7 @@ impl ReferenceGaitFields {
                 "radians" => Some(Unit::Radians),
                 other => return Err(Error::invalid("unit", other, "degrees, radians or empty")),
             },
+            columns: self.columns.read()?,
             force_column: given(&self.force_column),
             forces: Some(self.forces.clone()).filter(|text| !text.trim().is_empty()),
             strikes: self.strikes,
@@ -77,8 +85,21 @@ impl ReferenceGaitFields {
     /// The recording, with everything checked that needs no look into it.
     fn read_and_check(&self) -> Result<NewReferenceGait, Error> {
         let new = self.read()?;
-        new.check_person(self.button == "preview")?;
+        check_not_c3d(&self.file_name)?;
+        new.check_person(!self.imports())?;
         Ok(new)
+    }
+}
+
+impl ReferenceGaitFields {
+    /// Whether the form asks for the import.
+    fn imports(&self) -> bool {
+        !["preview", "columns"].contains(&self.button.as_str())
+    }
+
+    /// The name of the file, as the page shows it.
+    fn shown_file_name(&self) -> String {
+        form_numbers::file_name(&self.file_name).unwrap_or_default()
     }
 }
 
@@ -89,7 +110,8 @@ impl TypedForm for ReferenceGaitFields {
         ("body_mass_kg", "Body mass"),
         ("recording", "File contents"),
         ("heel_strikes_s", "Times of right heel strikes, s"),
-        ("unit", "Angle unit of an OpenSim file"),
+        ("unit", "Unit of the angles"),
+        ("columns", "Columns of the angles"),
         ("force_column", "Column of the vertical force under the right foot"),
         ("forces", "Contents of the force file"),
     ];
@@ -105,6 +127,7 @@ impl TypedForm for ReferenceGaitFields {
             "body_mass_kg" => self.body_mass_kg.clear(),
             "heel_strikes_s" => self.heel_strikes_s.clear(),
             "unit" => self.unit.clear(),
+            "columns" => self.columns = AngleColumnFields::default(),
             _ => return false,
         }
         true
@@ -126,6 +149,8 @@ struct ReferenceGaitsPage {
     may_run: bool,
     fields: ReferenceGaitFields,
     refused: RefusedFields,
+    /// The columns of the recording in the form, if they are chosen.
+    columns: Option<ColumnsPage>,
     /// The preview of the recording in the form.
     preview: Option<RecordingPreview>,
 }
@@ -151,6 +176,7 @@ impl ReferenceGaitsPage {
             may_run,
             fields: ReferenceGaitFields::default(),
             refused: RefusedFields::default(),
+            columns: None,
             preview: None,
         })
     }
@@ -187,31 +213,73 @@ pub(super) async fn import(
 ) -> Result<Response, PageError> {
     let mut check = FormCheck::new(&fields);
     let new = check.read(ReferenceGaitFields::read_and_check)?;
-    let mut preview = None;
-    match new {
-        Some(new) if fields.button == "preview" => {
-            let of = move |_: &OnPool| Ok(RecordingPreview::of_reference(&new.preview()?, ReferenceGaitFields::LABELS));
-            match app.compute(of).await.map_err(Error::from)? {
-                Ok(found) => preview = Some(found),
+    let (mut fields, mut columns, mut preview) = (fields, None, None);
+    if let Some(new) = new {
+        if fields.imports() {
+            match new.clone().definition_on_pool(app.store_mut()).await {
+                Ok(definition) if check.is_clean() => {
+                    let mut writer = app.write().await?;
+                    let (added, _) = reference_import::add(&mut writer, &authorized.caller.actor, &definition).await?;
+                    commit(writer).await?;
+                    return Ok(Redirect::to(&format!("/reference-gaits/{}", added.id)).into_response());
+                }
+                Ok(_) => {}
                 Err(error) => check.refuse(error).map(drop)?,
             }
         }
-        Some(new) => match new.definition_on_pool(app.store_mut()).await {
-            Ok(definition) if check.is_clean() => {
-                let mut writer = app.write().await?;
-                let (added, _) = reference_import::add(&mut writer, &authorized.caller.actor, &definition).await?;
-                commit(writer).await?;
-                return Ok(Redirect::to(&format!("/reference-gaits/{}", added.id)).into_response());
+        let (are_chosen, asks, imports) =
+            (fields.columns.are_asked_for(), fields.button == "columns", fields.imports());
+        match app.compute(move |_: &OnPool| shown(new, are_chosen, asks, imports)).await.map_err(Error::from)? {
+            Ok(found) => {
+                if let Some((page, unit)) = found.columns {
+                    unit.clone_into(&mut fields.unit);
+                    columns = Some(page);
+                }
+                preview = found.preview;
+                if let Some(error) = found.refused {
+                    check.refuse(error)?;
+                }
             }
-            Ok(_) => {}
             Err(error) => check.refuse(error).map(drop)?,
-        },
-        None => {}
+        }
     }
     let refused = check.into_refused();
     let status = refused.status();
     let empty = ReferenceGaitsPage::read(&mut *app.read().await?, units, None, true).await?;
-    Ok((status, page(&ReferenceGaitsPage { fields, refused, preview, ..empty })?).into_response())
+    Ok((status, page(&ReferenceGaitsPage { fields, refused, columns, preview, ..empty })?).into_response())
+}
+
+/// What the page shows of a recording.
+struct ShownRecording {
+    /// The columns and their unit, if they are chosen.
+    columns: Option<(ColumnsPage, &'static str)>,
+    preview: Option<RecordingPreview>,
+    /// Why there is no preview although the columns are chosen.
+    refused: Option<Error>,
+}
+
+/// Reads and draws a recording. Columns are chosen if the form asked for them, or if the file does not have the names of its
+/// format; the preview follows once they are. A refused import without a choice of columns shows the form alone.
+fn shown(mut new: NewReferenceGait, are_chosen: bool, asks: bool, imports: bool) -> Result<ShownRecording, Error> {
+    let preview_of = |new: &NewReferenceGait| {
+        Ok::<_, Error>(RecordingPreview::of_reference(&new.preview()?, ReferenceGaitFields::LABELS))
+    };
+    if !are_chosen && !asks && !new.needs_columns() {
+        let preview = if imports { None } else { Some(preview_of(&new)?) };
+        return Ok(ShownRecording { columns: None, preview, refused: None });
+    }
+    let choice = new.column_choice()?;
+    let columns = (ColumnsPage::new(&choice, &USED_BY_REFERENCE, &OF_REFERENCE)?, unit_word(choice.unit));
+    let mut found = ShownRecording { columns: Some(columns), preview: None, refused: None };
+    if are_chosen && !asks {
+        new.columns = choice.chosen;
+        new.unit = Some(choice.unit.into());
+        match preview_of(&new) {
+            Ok(preview) => found.preview = Some(preview),
+            Err(error) => found.refused = Some(error),
+        }
+    }
+    Ok(found)
 }
 
 #[derive(Template)]

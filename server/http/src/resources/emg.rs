@@ -7,6 +7,28 @@ use gaitwright_store::MeasurementFileId;
 use serde::Serialize;
 use utoipa::ToSchema;
 
+/// The heel strike at which the cycle of a channel begins: `right_heel_strike`; `left_heel_strike`, as recorded; or
+/// `assumed_left_heel_strike`, half a stride after the right one.
+#[derive(Debug, Serialize, ToSchema)]
+pub(crate) enum CycleStart {
+    #[serde(rename = "right_heel_strike")]
+    Right,
+    #[serde(rename = "left_heel_strike")]
+    Left,
+    #[serde(rename = "assumed_left_heel_strike")]
+    AssumedLeft,
+}
+
+impl From<emg::CycleStart> for CycleStart {
+    fn from(start: emg::CycleStart) -> Self {
+        match start {
+            emg::CycleStart::RightHeelStrike => Self::Right,
+            emg::CycleStart::LeftHeelStrike => Self::Left,
+            emg::CycleStart::AssumedLeftHeelStrike => Self::AssumedLeft,
+        }
+    }
+}
+
 /// Activity of a channel at 0, 1, ..., 100 % of the gait cycle, mean over strides.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct CycleActivity {
@@ -19,12 +41,15 @@ pub(crate) struct CycleActivity {
     /// Number of strides.
     #[schema(value_type = u64)]
     strides: usize,
+    /// Heel strike at which the cycle begins: that of the leg of the channel. Results stored without this value begin at
+    /// right heel strike.
+    begins_at: CycleStart,
 }
 
 impl From<emg::CycleActivity> for CycleActivity {
     fn from(activity: emg::CycleActivity) -> Self {
-        let emg::CycleActivity { channel, mean, standard_deviation, strides } = activity;
-        Self { channel, mean, standard_deviation, strides }
+        let emg::CycleActivity { channel, mean, standard_deviation, strides, begins_at } = activity;
+        Self { channel, mean, standard_deviation, strides, begins_at: begins_at.into() }
     }
 }
 
@@ -77,8 +102,8 @@ pub(crate) struct WalkActivity {
     walk: u8,
     /// Measurement file that it was computed from.
     measurement_file_id: MeasurementFileId,
-    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
-    /// the peak of walk 1.
+    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from the heel strike of its leg,
+    /// relative to the peak of walk 1.
     channels: Vec<CycleActivity>,
     /// Mean of each channel over the cycle, relative to the peak of walk 1.
     averages: Vec<f64>,

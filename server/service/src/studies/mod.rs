@@ -6,6 +6,8 @@
 
 pub mod actions_with_known_gait;
 pub mod analysis;
+pub mod angle_columns;
+pub mod angle_curves;
 pub mod answer_giver;
 pub mod archive;
 pub mod assessment_answer;
@@ -19,6 +21,7 @@ pub mod certificate_request;
 pub mod certification;
 pub mod certified_best;
 mod certifier;
+mod column_names;
 pub mod command;
 pub mod consent;
 mod controller_file;
@@ -69,6 +72,7 @@ pub mod sample_study;
 pub mod scheduler;
 pub mod seed;
 pub mod sensitivities;
+mod signal_extremes;
 mod simulated_walks;
 pub mod simulated_walks_setting;
 pub mod snapshot;

@@ -1,8 +1,10 @@
 //! Imports reference gaits from recordings of joint angles. For pages, REST and the command line.
 
+use super::angle_columns::{self, ChosenColumn, ChosenColumns};
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_optimizer::ReferenceGait as Definition;
+use gait_optimizer::angle_table::AngleTable;
 use gait_optimizer::reference::{AngleUnit, HeelStrikes, MeasuredPerson, MotionRecording};
 use gaitwright_store::audit::{self, Actor};
 use gaitwright_store::reference_gaits::{self, ReferenceGaitRow};
@@ -57,6 +59,15 @@ impl From<Unit> for AngleUnit {
     }
 }
 
+impl From<AngleUnit> for Unit {
+    fn from(unit: AngleUnit) -> Self {
+        match unit {
+            AngleUnit::Degrees => Self::Degrees,
+            AngleUnit::Radians => Self::Radians,
+        }
+    }
+}
+
 /// How to find right heel strikes: `force`, where the vertical force under the right foot rises above 20 N; `kinematics`,
 /// where the right heel is farthest ahead of the pelvis; `ends`, at the first and the last row of a recording of one
 /// stride.
@@ -86,6 +97,12 @@ pub struct NewReferenceGait {
     /// Unit of angles, if the header of an OpenSim file does not state it.
     #[serde(default)]
     pub unit: Option<Unit>,
+    /// Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R and, to find heel strikes from joint angles, knee_R) of a
+    /// file whose columns have other names or signs. Then the first column is the time, s, under any name; a CSV file needs
+    /// `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
+    #[serde(default)]
+    #[schema(value_type = BTreeMap<String, ChosenColumn>)]
+    pub columns: ChosenColumns,
     /// Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
     /// `Treadmill_R_vy` for Camargo 2021.
     #[serde(default)]
@@ -140,6 +157,7 @@ impl NewReferenceGait {
     /// [`Error::Invalid`] with line and column.
     pub(super) fn motion(&self, what: &str, forces: &str) -> Result<MotionRecording, Error> {
         let recording = match self.format {
+            _ if !self.columns.is_empty() => self.with_columns(what)?,
             JointAngleFormat::Opensim => {
                 let unit = self.unit.map(AngleUnit::from);
                 let here = self.force_column.as_deref().filter(|_| self.forces.is_none());
@@ -161,6 +179,25 @@ impl NewReferenceGait {
                 }
             }
             None => recording,
+        })
+    }
+
+    /// Reads the recording with the columns that were chosen.
+    fn with_columns(&self, what: &str) -> Result<MotionRecording, Error> {
+        let columns = angle_columns::columns_of("columns", &self.columns)?;
+        angle_columns::check_complete("columns", &self.columns)?;
+        let file = self.table(what)?;
+        let degrees = (self.format == JointAngleFormat::Camargo).then_some(AngleUnit::Degrees);
+        let unit = angle_columns::unit_of("unit", &file, self.unit.map(AngleUnit::from).or(degrees))?;
+        let here = self.force_column.as_deref().filter(|_| self.forces.is_none());
+        Ok(MotionRecording::from_columns(what, &file, unit, &columns, here)?)
+    }
+
+    /// The file with any names of columns.
+    pub(super) fn table(&self, what: &str) -> Result<AngleTable, Error> {
+        Ok(match self.format {
+            JointAngleFormat::Opensim => AngleTable::from_opensim(what, &self.recording)?,
+            JointAngleFormat::Camargo | JointAngleFormat::Csv => AngleTable::from_csv(what, &self.recording)?,
         })
     }
 

@@ -1,11 +1,12 @@
 //! A preview of a recording of joint angles before it becomes a reference gait: its angles over time, its heel strikes, the
 //! strides between them, and their mean.
 
-use super::lab::extremes;
-use super::reference_import::{FORCES, NewReferenceGait, RECORDING};
+use super::angle_curves::ColumnChoice;
+use super::reference_import::{FORCES, JointAngleFormat, NewReferenceGait, RECORDING};
+use super::signal_extremes::extremes;
 use crate::error::Error;
 use gait_optimizer::ReferenceGait as Definition;
-use gait_optimizer::reference::RecordedStride;
+use gait_optimizer::reference::{AngleUnit, MotionRecording, RecordedStride};
 
 /// The joints of a recording, in the order of its angles.
 const JOINTS: [&str; 5] = ["Torso lean", "Left hip", "Left knee", "Left ankle", "Right hip"];
@@ -33,6 +34,25 @@ pub struct AngleTrace {
 }
 
 impl NewReferenceGait {
+    /// The columns of the file and their curves, to choose them on a page.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column if the file cannot be read.
+    pub fn column_choice(&self) -> Result<ColumnChoice, Error> {
+        let degrees = (self.format == JointAngleFormat::Camargo).then_some(AngleUnit::Degrees);
+        let unit = self.unit.map(Into::into).or(degrees);
+        ColumnChoice::of(&self.table(RECORDING)?, &self.columns, unit, &self.heel_strikes_s)
+    }
+
+    /// Whether the file can be read, but its columns do not have the names of its format.
+    pub fn needs_columns(&self) -> bool {
+        self.table(RECORDING).is_ok_and(|file| match self.format {
+            JointAngleFormat::Opensim => !MotionRecording::has_names_of_opensim(&file),
+            JointAngleFormat::Camargo => !MotionRecording::has_names_of_camargo(&file),
+            JointAngleFormat::Csv => !MotionRecording::has_names_of_csv(&file),
+        })
+    }
+
     /// Reads the recording and previews it. What is missing for an import is said in [`ReferencePreview::reference`].
     ///
     /// # Errors

@@ -38,8 +38,8 @@ class ReferenceGaitsMethods(Transport):
         Segments the recording at right heel strikes and averages its strides. If the recording was already imported,
         the response contains the existing reference gait.
 
-        Fields: name, recording; optionally body_mass_kg, force_column, forces, format, heel_strikes_s, height_m,
-        strikes, unit.
+        Fields: name, recording; optionally body_mass_kg, columns, force_column, forces, format, heel_strikes_s,
+        height_m, strikes, unit.
         """
         return cast(ReferenceGait, self.request_json("POST", "/api/v1/reference-gaits", body=body, key=idempotency_key))
 

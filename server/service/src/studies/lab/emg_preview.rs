@@ -4,11 +4,9 @@
 use super::file_format::WHAT;
 use super::upload::NewEmg;
 use crate::error::Error;
-use gait_optimizer::emg::CHANNELS;
+use crate::studies::signal_extremes::extremes;
+use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgSettings};
 use gait_optimizer::reference::{is_plausible, strides_between};
-
-/// How many intervals the trace of a channel has. Each has its smallest and its largest sample.
-const INTERVALS: usize = 400;
 
 /// A preview of an EMG recording.
 #[derive(Debug)]
@@ -19,6 +17,9 @@ pub struct EmgPreview {
     pub traces: Vec<Trace>,
     /// The strides between the heel strikes; empty if heel strikes are unknown.
     pub strides: Vec<Stride>,
+    /// Mean activity over the gait cycle with the default filters, in the unit of the file. Empty if the file would be refused,
+    /// or if these filters do not fit its sampling rate.
+    pub cycles: Vec<CycleActivity>,
     /// Why the file would be refused as it is; empty if it would be accepted.
     pub refused: Vec<Error>,
 }
@@ -58,7 +59,7 @@ impl NewEmg {
     /// [`Error::Invalid`] with line and column if the file cannot be read.
     pub fn preview(&self) -> Result<EmgPreview, Error> {
         let whole = self.reading.whole(WHAT, &self.recording)?;
-        let strikes = self.reading.strikes(WHAT, &whole).unwrap_or_default();
+        let strikes = self.reading.strikes(WHAT, &whole).unwrap_or_default().right_s;
         let column_of = |channel: &str| match self.reading.channels.get(channel) {
             Some(column) => Some(column.clone()),
             None if self.reading.channels.is_empty() => Some(channel.to_owned()),
@@ -86,33 +87,26 @@ impl NewEmg {
             is_plausible: is_plausible((start_s, end_s)),
             rejected: self.reading.rejected_strides.contains(&number),
         };
+        let refused = self.reading.faults(&self.recording);
+        let cycles = if refused.is_empty() { self.cycles().unwrap_or_default() } else { Vec::new() };
         Ok(EmgPreview {
+            cycles,
             traces: CHANNELS.into_iter().filter_map(trace).collect(),
             strides: (1..).zip(strides_between(&strikes)).map(stride).collect(),
-            refused: self.reading.faults(&self.recording),
+            refused,
             columns: whole.channels.into_iter().map(|(name, _)| name).collect(),
         })
     }
 }
 
-/// The smallest and the largest sample of each interval, in order of time.
-pub(in crate::studies) fn extremes(samples: &[f64]) -> Vec<(usize, f64)> {
-    let length = samples.len().div_ceil(INTERVALS).max(1);
-    let mut points = Vec::new();
-    for (interval, part) in samples.chunks(length).enumerate() {
-        let place = |best: fn(&f64, &f64) -> std::cmp::Ordering| {
-            part.iter()
-                .enumerate()
-                .max_by(|a, b| best(a.1, b.1))
-                .map(|(place, value)| (interval * length + place, *value))
-        };
-        let (low, high) = (place(|a, b| b.total_cmp(a)), place(f64::total_cmp));
-        let mut both: Vec<(usize, f64)> = low.into_iter().chain(high).collect();
-        both.sort_by_key(|(place, _)| *place);
-        both.dedup_by_key(|(place, _)| *place);
-        points.append(&mut both);
+impl NewEmg {
+    /// Mean activity over the gait cycle with the default filters, in the order of the traces.
+    fn cycles(&self) -> Result<Vec<CycleActivity>, Error> {
+        let (recording, strikes) = self.reading.read(WHAT, &self.recording)?;
+        let mut cycles = recording.cycles(&self.reading.kept_strides(&strikes)?, &EmgSettings::default())?;
+        cycles.sort_by_key(|cycle| CHANNELS.iter().position(|channel| *channel == cycle.channel));
+        Ok(cycles)
     }
-    points
 }
 
 #[cfg(test)]
@@ -120,6 +114,7 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::float_cmp)]
     use super::*;
     use crate::studies::lab::EmgReading;
+    use crate::studies::signal_extremes::INTERVALS;
     use std::fmt::Write;
 
     fn recording(strikes: Vec<f64>) -> NewEmg {

@@ -1,6 +1,7 @@
 //! How to read an EMG recording: channels, heel strikes, and the strides to leave out.
 
 use super::file_format::{MeasurementFormat, WHAT, check_file_name};
+use super::foot_strikes::FootStrikes;
 use crate::error::{Error, FieldError};
 use gait_optimizer::ModelError;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, EmgRecording, Envelope};
@@ -25,9 +26,15 @@ pub struct EmgReading {
     pub heel_strikes_s: Vec<f64>,
     /// Column of a switch under the right heel, or of the vertical force under the right foot.
     pub heel_strike_column: Option<String>,
-    /// Value of `heel_strike_column`, in the unit of the column, above which the foot is on the ground.
+    /// Times of left heel strikes, s. The cycle of the left leg begins with them. If neither these times nor
+    /// `left_heel_strike_column` are given, the left foot is taken to strike half a stride after the right one.
+    pub left_heel_strikes_s: Vec<f64>,
+    /// Column of a switch under the left heel, or of the vertical force under the left foot.
+    pub left_heel_strike_column: Option<String>,
+    /// Value of the columns of heel strikes, in their unit, above which a foot is on the ground.
     pub heel_strike_threshold: f64,
-    /// Numbers of the strides to leave out, counted from 1 in the order of the heel strikes.
+    /// Numbers of the strides to leave out, counted from 1 in the order of the right heel strikes. Strides of the left leg
+    /// that overlap with them are left out too.
     pub rejected_strides: Vec<u32>,
     /// Name of the file, as it is shown.
     #[schema(max_length = 200)]
@@ -42,6 +49,8 @@ impl Default for EmgReading {
             channels: BTreeMap::new(),
             heel_strikes_s: Vec::new(),
             heel_strike_column: None,
+            left_heel_strikes_s: Vec::new(),
+            left_heel_strike_column: None,
             heel_strike_threshold: 0.5,
             rejected_strides: Vec::new(),
             file_name: None,
@@ -54,7 +63,7 @@ impl EmgReading {
     ///
     /// # Errors
     /// [`Error::Invalid`] with line and column, or the field.
-    pub fn read(&self, what: &str, text: &str) -> Result<(EmgRecording, Vec<f64>), Error> {
+    pub fn read(&self, what: &str, text: &str) -> Result<(EmgRecording, FootStrikes), Error> {
         self.check_names()?;
         let whole = self.whole(what, text)?;
         Ok((self.selected(what, &whole)?, self.strikes(what, &whole)?))
@@ -94,9 +103,9 @@ impl EmgReading {
         })
     }
 
-    /// The right heel strikes, s.
-    pub(super) fn strikes(&self, what: &str, whole: &EmgRecording) -> Result<Vec<f64>, Error> {
-        Ok(match (&self.heel_strike_column, &self.heel_strikes_s[..]) {
+    /// The heel strikes of both feet.
+    pub(super) fn strikes(&self, what: &str, whole: &EmgRecording) -> Result<FootStrikes, Error> {
+        let right_s = match (&self.heel_strike_column, &self.heel_strikes_s[..]) {
             (Some(column), []) => whole.strikes_of_column(what, column, self.heel_strike_threshold)?,
             (None, given @ [_, _, ..]) => {
                 whole.check_strikes(what, given)?;
@@ -106,7 +115,39 @@ impl EmgReading {
                 let allowed = "at least two heel-strike times, or none if a heel strike column is given";
                 return Err(Error::invalid("reading.heel_strikes_s", json!(given), allowed));
             }
-        })
+        };
+        Ok(FootStrikes { right_s, left_s: self.left_strikes(what, whole)? })
+    }
+
+    /// The left heel strikes, s; `None`: not recorded.
+    fn left_strikes(&self, what: &str, whole: &EmgRecording) -> Result<Option<Vec<f64>>, Error> {
+        let of_field = |field: &'static str| move |error| Error::from(FieldError::from(error).renamed(what, field));
+        match (&self.left_heel_strike_column, &self.left_heel_strikes_s[..]) {
+            (None, []) => Ok(None),
+            (Some(column), []) if self.heel_strike_column.as_ref() == Some(column) => {
+                let field = "reading.left_heel_strike_column";
+                Err(Error::invalid(field, column.as_str(), "another column than that of the right heel strikes"))
+            }
+            (Some(column), []) => {
+                let strikes = whole.strikes_of_column(what, column, self.heel_strike_threshold);
+                strikes.map(Some).map_err(of_field("reading.left_heel_strike_column"))
+            }
+            (None, given @ [_, _, ..]) => {
+                let checked = whole.check_strikes(what, given);
+                // A time outside the recording is named as a right heel strike.
+                checked.map_err(|error| match FieldError::from(error) {
+                    fault if fault.field == "heel_strikes_s" => {
+                        Error::from(fault.renamed("heel_strikes_s", "reading.left_heel_strikes_s"))
+                    }
+                    fault => fault.renamed(what, "reading.left_heel_strikes_s").into(),
+                })?;
+                Ok(Some(given.to_vec()))
+            }
+            (_, given) => {
+                let allowed = "at least two heel-strike times, or none if a column of left heel strikes is given";
+                Err(Error::invalid("reading.left_heel_strikes_s", json!(given), allowed))
+            }
+        }
     }
 
     /// Checks that a file has EMG signals and can be cut into strides, for any filter settings.
@@ -129,7 +170,7 @@ impl EmgReading {
             self.selected(WHAT, &whole).map_err(of_channels)
         });
         let strikes = self.strikes(WHAT, &whole).map_err(|error| match error {
-            Error::Invalid(fault) => {
+            Error::Invalid(fault) if !fault.field.contains("left_") => {
                 let of_column = self.heel_strike_column.is_some();
                 let field = if of_column { "reading.heel_strike_column" } else { "reading.heel_strikes_s" };
                 fault.renamed(WHAT, field).into()
@@ -151,12 +192,12 @@ impl EmgReading {
         faults
     }
 
-    fn check_strides(&self, recording: EmgRecording, strikes: &[f64]) -> Result<(), Error> {
+    fn check_strides(&self, recording: EmgRecording, strikes: &FootStrikes) -> Result<(), Error> {
         let strides = self.kept_strides(strikes)?;
         recording.check_channels()?;
         for (channel, values) in recording.channels {
             let raw = Envelope { channel, start_s: recording.start_s, rate_hz: recording.rate_hz, values };
-            CycleActivity::of_strides(&raw, &strides)?;
+            CycleActivity::of_leg(&raw, &strides)?;
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Format and name of a measurement file.
 
-use crate::error::Error;
+use crate::error::{Error, FieldError};
 use crate::printable;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -20,9 +20,24 @@ pub enum MeasurementFormat {
     Opensim,
 }
 
+/// How to convert a C3D file.
+pub const C3D_FILE: &str = "C3D files are not read. Export the signals to CSV, for example with Mokka or with ezc3d in Python, or to a \
+                            .mot or .sto file with OpenSim, and choose that file.";
+
+/// Refuses a file by its name if it is a C3D file.
+///
+/// # Errors
+/// [`Error::Invalid`] naming the file.
+pub fn check_not_c3d(name: &str) -> Result<(), Error> {
+    let is_c3d = name.trim().to_ascii_lowercase().ends_with(".c3d");
+    if is_c3d { Err(FieldError::in_words(WHAT, C3D_FILE).into()) } else { Ok(()) }
+}
+
 /// Longest name of a file, characters.
 const LONGEST_FILE_NAME: usize = 200;
 
 pub(super) fn check_file_name(name: Option<&str>) -> Result<(), Error> {
-    name.map_or(Ok(()), |name| printable::name("reading.file_name", name, LONGEST_FILE_NAME).map(|_| ()))
+    let Some(name) = name else { return Ok(()) };
+    check_not_c3d(name)?;
+    printable::name("reading.file_name", name, LONGEST_FILE_NAME).map(|_| ())
 }

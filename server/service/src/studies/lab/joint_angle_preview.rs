@@ -1,10 +1,11 @@
 //! A preview of a recording of joint angles before it is stored: its angles over time, and the strides between right heel
 //! strikes, which are found from the joint angles.
 
-use super::emg_preview::extremes;
-use super::file_format::WHAT;
-use super::upload::NewJointAngles;
+use super::file_format::{MeasurementFormat, WHAT};
+use super::upload::{JointAngleReading, NewJointAngles};
 use crate::error::Error;
+use crate::studies::angle_curves::ColumnChoice;
+use crate::studies::signal_extremes::extremes;
 use gait_optimizer::limit_cycle::JointRecording;
 use gait_optimizer::reference::{HeelStrikes, MotionRecording, RecordedStride};
 
@@ -36,6 +37,25 @@ impl NewJointAngles {
         let (strikes_s, strides) = strides(&recording).unwrap_or_default();
         let refused = self.reading.faults(&self.recording);
         Ok(JointAnglePreview { traces: recording.joints.iter().map(trace).collect(), strikes_s, strides, refused })
+    }
+}
+
+impl NewJointAngles {
+    /// The columns of the file and their curves, to choose them on a page.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with line and column if the file cannot be read.
+    pub fn column_choice(&self) -> Result<ColumnChoice, Error> {
+        let JointAngleReading { columns, unit, .. } = &self.reading;
+        ColumnChoice::of(&self.reading.table(&self.recording)?, columns, unit.map(Into::into), &[])
+    }
+
+    /// Whether the file can be read, but its columns do not have the names of its format.
+    pub fn needs_columns(&self) -> bool {
+        self.reading.table(&self.recording).is_ok_and(|file| match self.reading.format {
+            MeasurementFormat::Csv => !JointRecording::has_names_of_csv(&file),
+            MeasurementFormat::Opensim => !JointRecording::has_names_of_opensim(&file),
+        })
     }
 }
 

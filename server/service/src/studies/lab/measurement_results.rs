@@ -25,8 +25,8 @@ pub struct WalkActivity {
     pub walk: u8,
     /// Measurement file that it was computed from.
     pub measurement_file_id: MeasurementFileId,
-    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from right heel strike, relative to
-    /// the peak of walk 1.
+    /// Mean and standard deviation of each channel at 0, 1, ..., 100 % of the cycle from the heel strike of its leg,
+    /// relative to the peak of walk 1.
     pub channels: Vec<CycleActivity>,
     /// Mean of each channel over the cycle.
     pub averages: Vec<f64>,
@@ -71,7 +71,7 @@ pub async fn compute(store: &mut Store, id: LabSessionId, settings: EmgSettings)
         let mut normal: Vec<CycleActivity> = Vec::new();
         for (walk, measurement_file_id, reading, file) in &files {
             let (recording, strikes) = reading.read(WHAT, &file.text(pool)?)?;
-            let measured = recording.cycles_of(&reading.kept_strides(&strikes)?, &settings)?;
+            let measured = recording.cycles(&reading.kept_strides(&strikes)?, &settings)?;
             let activity = if walks.is_empty() {
                 normal = measured;
                 Activity::of_normal_walking(&normal)?

@@ -6,9 +6,12 @@
 //! numbers, and the answer reaches the learner at unblinding.
 
 mod controller_file_download;
+mod emg_guesses;
+mod emg_overview;
 mod emg_preview;
 mod emg_reading;
 mod file_format;
+mod foot_strikes;
 mod joint_angle_preview;
 mod measurement_results;
 mod question;
@@ -21,10 +24,12 @@ mod unblinding;
 mod upload;
 
 pub use controller_file_download::{GaitOfWalk, for_device};
-pub(super) use emg_preview::extremes;
+pub use emg_guesses::HeelStrikeColumn;
+pub use emg_overview::{ColumnTrace, EmgOverview};
 pub use emg_preview::{EmgPreview, Stride, Trace};
 pub use emg_reading::EmgReading;
-pub use file_format::MeasurementFormat;
+pub use file_format::{C3D_FILE, MeasurementFormat, check_not_c3d};
+pub use foot_strikes::FootStrikes;
 pub use joint_angle_preview::JointAnglePreview;
 pub use measurement_results::{
     EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,

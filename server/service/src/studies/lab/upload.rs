@@ -4,8 +4,10 @@ use super::emg_reading::EmgReading;
 use super::file_format::{MeasurementFormat, WHAT, check_file_name};
 use super::session::{checked_walk, still_open};
 use crate::error::{Error, FieldError};
+use crate::studies::angle_columns::{self, ChosenColumn, ChosenColumns};
 use crate::studies::reference_import::Unit;
 use gait_optimizer::ModelError;
+use gait_optimizer::angle_table::AngleTable;
 use gait_optimizer::limit_cycle::{JointRecording, LimitCycle};
 use gaitwright_compute::{OnPool, Pool};
 use gaitwright_store::audit::{self, Actor};
@@ -39,6 +41,11 @@ pub struct JointAngleReading {
     pub format: MeasurementFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
+    /// Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R) of a file whose columns have other names
+    /// or signs. Then the first column is the time, s, under any name; a CSV file needs `unit`; and hip angles are relative to
+    /// the torso. If empty, the columns have the names of the format.
+    #[schema(value_type = BTreeMap<String, ChosenColumn>)]
+    pub columns: ChosenColumns,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
     pub cutoff_hz: f64,
     /// Name of the file, as it is shown.
@@ -48,7 +55,13 @@ pub struct JointAngleReading {
 
 impl Default for JointAngleReading {
     fn default() -> Self {
-        Self { format: MeasurementFormat::default(), unit: None, cutoff_hz: 6.0, file_name: None }
+        Self {
+            format: MeasurementFormat::default(),
+            unit: None,
+            columns: ChosenColumns::new(),
+            cutoff_hz: 6.0,
+            file_name: None,
+        }
     }
 }
 
@@ -65,10 +78,24 @@ impl JointAngleReading {
     }
 
     pub(super) fn joints(&self, text: &str) -> Result<JointRecording, Error> {
+        if !self.columns.is_empty() {
+            let columns = angle_columns::columns_of("reading.columns", &self.columns)?;
+            let file = self.table(text)?;
+            let unit = angle_columns::unit_of("reading.unit", &file, self.unit.map(Into::into))?;
+            return Ok(JointRecording::from_columns(&file, unit, &columns)?);
+        }
         Ok(match self.format {
             MeasurementFormat::Csv => JointRecording::from_csv(WHAT, text)?,
             MeasurementFormat::Opensim => JointRecording::from_opensim(WHAT, text, self.unit.map(Into::into))?,
         })
+    }
+
+    /// The file with any names of columns.
+    pub(super) fn table(&self, text: &str) -> Result<AngleTable, ModelError> {
+        match self.format {
+            MeasurementFormat::Csv => AngleTable::from_csv(WHAT, text),
+            MeasurementFormat::Opensim => AngleTable::from_opensim(WHAT, text),
+        }
     }
 
     /// Checks that a file gives a limit cycle and limit cycles with these settings.
