@@ -2,10 +2,12 @@
 
 pub mod attachment;
 pub mod curves;
+pub mod measured_parameters;
 pub mod muscle_tendon_units;
 pub mod parameters;
 
 pub use attachment::Attachment;
 pub use curves::{CurveValue, force_length, force_velocity, tendon_force};
+pub use measured_parameters::{MuscleField, MuscleOverride};
 pub use muscle_tendon_units::{MUSCLE_COUNT, MUSCLES, Muscle};
-pub use parameters::{MuscleField, MuscleOverride, MuscleParameters};
+pub use parameters::MuscleParameters;

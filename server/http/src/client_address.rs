@@ -1,6 +1,6 @@
 //! The client address of a request, for sign-in limits, sessions and logs.
 
-use super::{AppState, forwarded};
+use super::{AppState, trusted_proxies};
 use crate::problem_details::Refusal;
 use axum::extract::{ConnectInfo, FromRequestParts, Request, State};
 use axum::http::request::Parts;
@@ -86,14 +86,14 @@ fn client_address(extensions: &Extensions) -> ClientAddress {
 /// TLS.
 pub(super) async fn note(State(app): State<AppState>, mut request: Request, next: Next) -> Result<Response, Refusal> {
     let peer = client_address(request.extensions());
-    if app.access.open && forwarded::is_forwarded(request.headers()) {
+    if app.access.open && trusted_proxies::is_forwarded(request.headers()) {
         let reason = "A proxy forwarded this request, but a service without sign-in accepts requests from this \
                       machine only. Start it without --no-sign-in to use it through a proxy.";
         return Err(Error::Forbidden(reason.to_owned()).into());
     }
     let believed = app.proxies.believe(peer.ip(), request.headers())?;
     let secure = Secure(believed.secure.unwrap_or(app.access.secure));
-    forwarded::remove(request.headers_mut());
+    trusted_proxies::remove(request.headers_mut());
     // A request with two Host headers is refused later.
     if let Some(host) = believed.host
         && request.headers().get_all(header::HOST).iter().count() < 2

@@ -4,7 +4,7 @@
 //! network that already has its share is refused at once, because connections are accepted one after another.
 
 use super::client_address::ClientAddress;
-use super::forwarded::Proxies;
+use super::trusted_proxies::Proxies;
 use axum::extract::connect_info::Connected;
 use axum_server::{AddrListener, Address};
 use std::cmp::Reverse;

@@ -3,6 +3,7 @@
 use super::*;
 use crate::factorisation;
 use crate::nonlinear_program::{NonlinearProgram, SparsityPattern};
+use crate::settings::NlpSettings;
 
 /// min x_1 + 2 x_2, x_1 + x_2 = 1.
 struct Line {

@@ -38,6 +38,7 @@ mod subjects;
 mod suggestions;
 mod tokens;
 mod trials;
+mod trials_csv;
 mod undo;
 mod users;
 mod walk_controller_files;
@@ -72,7 +73,7 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(studies::clone_study))
         .routes(routes!(study_comparison::get))
         .routes(routes!(trials::of_study))
-        .routes(routes!(trials::of_study_csv))
+        .routes(routes!(trials_csv::download))
         .routes(routes!(recommendation::of_study))
         .routes(routes!(recommendation::of_study_csv))
         .routes(routes!(study_archives::of_study))

@@ -4,7 +4,6 @@ use super::jobs::Job;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
-use crate::csv_response::csv_response;
 use crate::idempotent::Idempotent;
 use crate::paging::{Page, Paging};
 use crate::problem_details::Refusal;
@@ -14,8 +13,7 @@ use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
 use axum::response::Response;
-use gait_optimizer::{IterationRecord, TunedBounds};
-use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
+use gait_optimizer::IterationRecord;
 use gaitwright_service::access::{Read, Run};
 use gaitwright_service::job::JobId;
 use gaitwright_service::studies::cancelled_trial;
@@ -24,7 +22,6 @@ use gaitwright_store::trial_list::{self, ListStart, Listing, SORTS, TrialPlace};
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
 use serde::de::{Deserialize, Deserializer, Error as _};
-use std::collections::HashMap;
 
 /// Filter and order of trials.
 #[derive(Debug, serde::Deserialize)]
@@ -101,24 +98,6 @@ pub(super) async fn of_study(
         found.push(trials::get(&mut reader, trial.id).await?.into());
     }
     Ok(Json(Page::of_parts(found, next)))
-}
-
-/// Download trials as CSV
-#[utoipa::path(
-    get,
-    path = "/studies/{id}/trials.csv",
-    operation_id = "get_trials_csv",
-    tag = "trials",
-    params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "All trials, sorted by number", body = String, content_type = "text/csv"), (status = 409, description = "The subject withdrew consent")),
-    security(("token" = ["read"]), ("session" = ["read"])),
-)]
-pub(super) async fn of_study_csv(
-    _: Authorized<Read>,
-    State(mut app): State<AppState>,
-    Visible(id, _): Visible<StudyId, Read>,
-) -> Result<Response, Refusal> {
-    table(&mut app, id).await
 }
 
 /// Get a trial
@@ -246,49 +225,4 @@ pub(super) async fn attempts(
 ) -> Result<Json<Page<AttemptResult>>, Refusal> {
     let results = attempts::of_trial(&mut *app.read().await?, id).await?;
     Ok(Json(paging.cut(results, |attempt| attempt.attempt)?.map(AttemptResult::from)))
-}
-
-async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
-    let mut reader = app.read().await?;
-    studies::get(&mut reader, id).await?;
-    let all = trials::of_study(&mut reader, id).await?;
-    drop(reader);
-    csv_response(app, &format!("trials-{}.csv", id.short()), move || written(&all)).await
-}
-
-fn written(all: &[trials::Trial]) -> CsvTable {
-    let mut header = vec!["number", "trial_id"];
-    header.extend(TunedBounds::NAMES);
-    header.extend([
-        "state",
-        "gait_rmse_rad",
-        "cost_of_transport",
-        "mean_strides",
-        "max_violation",
-        "iterations",
-        "seconds_total",
-        "warm_started_from",
-        "reason",
-        "message",
-    ]);
-    let numbers: HashMap<TrialId, u32> = all.iter().map(|trial| (trial.id, trial.number)).collect();
-    let mut table = CsvTable::new(header);
-    for trial in all {
-        let mut row = cells![trial.number, trial.id.to_string()];
-        row.extend(trial.action.to_array().iter().map(CsvCell::from));
-        row.extend(cells![
-            trial.state.as_str(),
-            trial.gait_rmse_rad,
-            trial.cost_of_transport,
-            trial.mean_strides,
-            trial.max_violation,
-            trial.iterations,
-            trial.seconds_total,
-            trial.warm_started_from.and_then(|id| numbers.get(&id)),
-            &trial.reason,
-            &trial.message,
-        ]);
-        table.row(row);
-    }
-    table
 }

@@ -1,34 +1,13 @@
 //! The preferences that Gait RMSE implies where it answers in place of people.
 
 use super::snapshot::StudySnapshot;
+use super::tie_break::{BrokenTie, ComparedGait};
 use crate::error::Error;
 use gait_learner::{LearnerError, proposed_comparisons_among};
 use gaitwright_compute::OnPool;
 use gaitwright_store::TrialId;
 use gaitwright_store::feedback::FeedbackContent;
-use gaitwright_store::studies::{AnswerSource, SimulatedWalks, SimulatedWalksEffect};
-use gaitwright_store::trials::Trial;
-
-/// What decides a comparison about a gait.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ComparedGait {
-    trial: TrialId,
-    number: u32,
-    gait_rmse_rad: f64,
-    mean_strides: Option<f64>,
-}
-
-impl ComparedGait {
-    /// The gait of a trial; `None` without Gait RMSE.
-    pub(super) fn of(trial: &Trial) -> Option<Self> {
-        Some(Self {
-            trial: trial.id,
-            number: trial.number,
-            gait_rmse_rad: trial.gait_rmse_rad?,
-            mean_strides: trial.mean_strides,
-        })
-    }
-}
+use gaitwright_store::studies::{AnswerSource, SimulatedWalks};
 
 /// A computed answer.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,8 +60,10 @@ fn partners(_: &OnPool, snapshot: &StudySnapshot, new: TrialId) -> Result<Vec<Tr
 /// The computed answer about two gaits. The smaller Gait RMSE is better, equal values mean no difference. If simulated
 /// walks break ties and the values differ by less than the tolerance, the gait with more strides is better.
 pub(super) fn answer(walks: &SimulatedWalks, new: ComparedGait, old: ComparedGait) -> ComputedAnswer {
-    match by_mean_strides(walks, new, old) {
-        Some(answer) => answer,
+    match BrokenTie::between(walks, new, old) {
+        Some(BrokenTie { winner, loser, reason }) => {
+            ComputedAnswer { content: FeedbackContent::Preference { winner, loser }, note: reason }
+        }
         None => ComputedAnswer { content: by_gait_rmse(new, old), note: String::new() },
     }
 }
@@ -97,30 +78,10 @@ fn by_gait_rmse(new: ComparedGait, old: ComparedGait) -> FeedbackContent {
     }
 }
 
-/// `None` if Gait RMSE decides: simulated walks break no ties, there is no tie, or both gaits have the same mean strides.
-fn by_mean_strides(walks: &SimulatedWalks, new: ComparedGait, old: ComparedGait) -> Option<ComputedAnswer> {
-    let (of_new, of_old) = (new.mean_strides?, old.mean_strides?);
-    let difference = (new.gait_rmse_rad - old.gait_rmse_rad).abs();
-    let is_tie = walks.effect == SimulatedWalksEffect::TieBreak && difference < walks.gait_rmse_tolerance_rad;
-    if !is_tie || of_new == of_old {
-        return None;
-    }
-    let (winner, loser) = if of_new > of_old { (new, old) } else { (old, new) };
-    let note = format!(
-        "Gait RMSE differs by {difference:.4} rad, less than the tolerance of {} rad, so simulated walks decide: {:.2} strides \
-         on average with trial {}, {:.2} with trial {}.",
-        walks.gait_rmse_tolerance_rad,
-        of_new.max(of_old),
-        winner.number,
-        of_new.min(of_old),
-        loser.number,
-    );
-    Some(ComputedAnswer { content: FeedbackContent::Preference { winner: winner.trial, loser: loser.trial }, note })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gaitwright_store::studies::SimulatedWalksEffect;
 
     fn gait(number: u32, gait_rmse_rad: f64, mean_strides: Option<f64>) -> ComparedGait {
         ComparedGait { trial: TrialId::fresh(), number, gait_rmse_rad, mean_strides }
@@ -160,16 +121,5 @@ mod tests {
         ] {
             assert_eq!(decided(SimulatedWalksEffect::TieBreak, other, better), (new_wins, false), "{other:?}");
         }
-    }
-
-    #[test]
-    fn reason_of_an_answer_names_both_gaits_and_the_tolerance() {
-        let walks = SimulatedWalks { effect: SimulatedWalksEffect::TieBreak, ..SimulatedWalks::default() };
-        let ComputedAnswer { note, .. } = answer(&walks, gait(7, 0.62, Some(4.25)), gait(3, 0.6, Some(2.0)));
-        assert_eq!(
-            note,
-            "Gait RMSE differs by 0.0200 rad, less than the tolerance of 0.05 rad, so simulated walks decide: 4.25 strides \
-             on average with trial 7, 2.00 with trial 3."
-        );
     }
 }

@@ -87,6 +87,7 @@ pub mod subject;
 pub mod suggestion;
 pub mod summary;
 mod tags;
+mod tie_break;
 pub mod trial_choice;
 mod trial_jobs;
 pub mod trial_result;

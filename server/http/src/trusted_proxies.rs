@@ -1,4 +1,4 @@
-//! Headers of reverse proxies: client address, scheme and host of a forwarded request.
+//! Trusted reverse proxies: client address, scheme and host of a forwarded request, from the headers of the proxies.
 //!
 //! They are trusted only from the configured networks, and only in the configured kind of header. A proxy overwrites
 //! the kind that it knows, but passes the other kind on as the client wrote it.
