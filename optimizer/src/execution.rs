@@ -5,7 +5,7 @@
 //! it can measure (`prosthesis`, `sensors`); the human joints track it compliantly (`human_joints`). Both tell the time of the
 //! stride from a phase variable (`stride_clock`). Gains and plant are the same for every gait.
 //!
-//! A random walk has a random body mass, speed at the start, push, delay, sensor noise and ground. The report says how
+//! A simulated walk draws body mass, initial speed, push, delay, sensor noise and ground at random. The report says how
 //! many walks end without a fall. It depends on the gait and the seed only, whatever the number of threads.
 
 mod actuator;

@@ -71,8 +71,8 @@ impl ModelError {
         Self::check_related_range(field, value, (minimum, maximum), ("", ""))
     }
 
-    /// The same for a field whose name does not have its unit, or whose range depends on another field. Both texts can
-    /// be empty.
+    /// Checks a range as [`Self::check_range`] does, for a field whose name lacks its unit or whose range depends on another
+    /// field. Unit and relation can be empty.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] with the field, the unit and the relation.

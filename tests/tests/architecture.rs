@@ -385,3 +385,52 @@ fn places_that_the_architecture_names_exist() {
     }
     assert!(seen > 60, "{seen}");
 }
+
+/// A bare module name in a row of a table is a file or folder below a folder that the row begins with; the words of the
+/// picture of modules are files or folders of their crate.
+#[test]
+fn modules_that_the_architecture_names_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let text = std::fs::read_to_string(root.join("ARCHITECTURE.md")).unwrap();
+    let files: Vec<String> = ["server", "optimizer", "learner"]
+        .into_iter()
+        .flat_map(|folder| sources::below(folder).into_iter().map(move |(file, _)| format!("/{folder}/{file}")))
+        .collect();
+    // `src/` stands for the modules directly in a crate.
+    let is_module = |folder: &str, name: &str| {
+        let (file, inner) = (format!("{name}.rs"), format!("{name}/"));
+        files.iter().any(|path| match (folder, path.split_once("/src/")) {
+            ("src/", Some((_, module))) => module == file || module.starts_with(&inner),
+            _ => {
+                path.contains(&format!("/{folder}"))
+                    && (path.ends_with(&format!("/{file}")) || path.contains(&format!("/{inner}")))
+            }
+        })
+    };
+    let is_word = |span: &&str| span.len() > 1 && span.chars().all(|c| c.is_ascii_lowercase() || c == '_');
+    let mut seen = 0;
+    for row in text.lines().filter(|line| line.starts_with("| `")) {
+        let (first, rest) = row[2..].split_once(" | ").unwrap();
+        let folders: Vec<&str> = first.split('`').skip(1).step_by(2).filter(|span| span.ends_with('/')).collect();
+        for name in rest.split('`').skip(1).step_by(2).filter(is_word).filter(|name| *name != "gaitwright") {
+            seen += 1;
+            assert!(
+                folders.iter().any(|folder| is_module(folder, name) || is_module("src/", name)),
+                "{folders:?}: {name}"
+            );
+        }
+    }
+    let picture = text.split("```").nth(3).unwrap();
+    let mut inside = "";
+    for line in picture.lines().filter(|line| line.contains("->")) {
+        let named = line.split(' ').next().unwrap();
+        inside = if named.is_empty() { inside } else { named };
+        let modules = line.strip_prefix(named).unwrap().trim_start().split("      ").next().unwrap();
+        let modules = modules.split(|c: char| !(c.is_ascii_lowercase() || c == '_')).filter(|word| !word.is_empty());
+        for name in modules {
+            seen += 1;
+            assert!(is_module(&format!("{inside}/"), name), "{inside}: {name}");
+        }
+    }
+    assert!(seen > 70, "{seen}");
+}

@@ -15,7 +15,7 @@ function countDown(form, end) {
   let last = performance.now();
   const look = () => {
     const now = performance.now();
-    // Whoever has reached the button with the keyboard has time to press it.
+    // The countdown stops while the form has the keyboard focus.
     if (!form.contains(document.activeElement)) left -= now - last;
     last = now;
     shown.textContent = ` (${Math.ceil(Math.max(left, 0) / 1000)} s)`;

@@ -32,7 +32,7 @@ pub(crate) fn against(
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
-    // Above the limit of a whole grid, `among` is present.
+    // The caller passes `among` if the grid is too large to enumerate.
     let set = match (posterior.space().enumerable(), among) {
         (Ok(len), _) => ActionSet::Grid(len),
         (Err(_), among) => {

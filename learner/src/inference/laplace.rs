@@ -18,7 +18,7 @@ const MAX_STEPS: usize = 1000;
 /// Squared Newton decrement, the squared distance to the mode in posterior standard deviations, from which on the
 /// convergence is quadratic: one more full step ends at the mode to rounding error.
 const DECREMENT: f64 = 1e-10;
-/// The same as a share of the objective, because its rounding error hides smaller steps from the line search.
+/// Squared Newton decrement as a share of the objective, whose rounding error hides smaller steps from the line search.
 const RELATIVE_DECREMENT: f64 = 1e-13;
 
 impl Approximate for Laplace {

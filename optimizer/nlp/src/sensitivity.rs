@@ -23,19 +23,19 @@ use thiserror::Error;
 /// Derivatives of a program with respect to a parameter, at the solution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterDerivative {
-    /// Of the objective.
+    /// Derivative of the objective.
     pub objective: f64,
-    /// Of the gradient of the Lagrangian f + y^T g, at fixed x and y (length n).
+    /// Derivative of the gradient of the Lagrangian f + y^T g, at fixed x and y (length n).
     pub lagrangian_gradient: Vec<f64>,
-    /// Of the rows g (length m).
+    /// Derivatives of the rows g (length m).
     pub rows: Vec<f64>,
-    /// Of the lower bounds of the variables (length n).
+    /// Derivatives of the lower bounds of the variables (length n).
     pub lower: Vec<f64>,
-    /// Of the upper bounds of the variables (length n).
+    /// Derivatives of the upper bounds of the variables (length n).
     pub upper: Vec<f64>,
-    /// Of the lower bounds of the rows (length m).
+    /// Derivatives of the lower bounds of the rows (length m).
     pub row_lower: Vec<f64>,
-    /// Of the upper bounds of the rows (length m).
+    /// Derivatives of the upper bounds of the rows (length m).
     pub row_upper: Vec<f64>,
 }
 
@@ -57,9 +57,9 @@ impl ParameterDerivative {
 /// Derivative of a solution with respect to a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// Of the primal-dual point; lengths and sign convention as in [`NlpResult`](crate::NlpResult).
+    /// Derivative of the primal-dual point; lengths and sign convention as in [`NlpResult`](crate::NlpResult).
     pub point: WarmPoint,
-    /// Of the objective.
+    /// Derivative of the objective.
     pub objective: f64,
     /// Relative residual of the linear system.
     pub residual: f64,

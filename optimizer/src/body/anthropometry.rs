@@ -20,9 +20,9 @@ const HIP_HEIGHT: f64 = 0.530;
 const HAT_LENGTH: f64 = 0.288;
 /// Ankle height / height.
 const ANKLE_HEIGHT: f64 = 0.039;
-/// Distance of the distance of the heel contact behind the ankle / height (0.060 m at 1.80 m, as in the model gait2d).
+/// Distance of the heel contact behind the ankle / height (0.060 m at 1.80 m, as in the model gait2d).
 const HEEL_BEHIND: f64 = 0.0333;
-/// Distance of the distance of the toe contact ahead of the ankle / height (0.150 m at 1.80 m, as in the model gait2d).
+/// Distance of the toe contact ahead of the ankle / height (0.150 m at 1.80 m, as in the model gait2d).
 const TOE_AHEAD: f64 = 0.0833;
 
 /// A rigid body.

@@ -35,7 +35,7 @@ impl CycleActivity {
         Self::of_strides(envelope, &strides_between(heel_strikes_s))
     }
 
-    /// The same for given strides, s.
+    /// The activity over the cycle in given strides, s.
     ///
     /// # Errors
     /// As [`Self::cut`].

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CycleStart {
-    /// That of the right foot.
+    /// Heel strike of the right foot.
     #[default]
     RightHeelStrike,
-    /// That of the left foot, as recorded.
+    /// Heel strike of the left foot, as recorded.
     LeftHeelStrike,
-    /// That of the left foot, taken to be half a stride after the right one.
+    /// Heel strike of the left foot, taken to be half a stride after the right one.
     AssumedLeftHeelStrike,
 }
 

@@ -34,7 +34,7 @@ pub(super) struct MassChanges {
 }
 
 impl MassChanges {
-    /// Those of a subject.
+    /// The changes that keep the body mass of a subject within its range.
     pub(super) fn of(body_mass_kg: f64) -> Self {
         let (lightest, heaviest) = Subject::BODY_MASS_RANGE_KG;
         Self {

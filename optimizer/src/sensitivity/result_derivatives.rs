@@ -13,7 +13,7 @@ const LARGEST_CHANGE: f64 = 1e-5;
 /// Derivatives of the results with respect to a tuned bound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ResultDerivatives {
-    /// Of the objective.
+    /// Derivative of the objective.
     pub objective: f64,
     /// Derivative of the mechanical cost of transport.
     pub cost_of_transport: f64,

@@ -165,7 +165,7 @@ pub(super) async fn note(
     let object = object(&route, uri.path(), uri.query());
     let parameters = parameters.iter().flat_map(|parameters| parameters.iter().map(|(_, value)| value));
     let mut named: Vec<String> = parameters.filter(|_| !route.contains("{link}")).flat_map(named_in).collect();
-    // Of the whole query, because `object` is truncated.
+    // Taken from the whole query, because `object` is truncated.
     let query: Vec<(String, String)> =
         uri.query().and_then(|query| serde_urlencoded::from_str(query).ok()).unwrap_or_default();
     named.extend(query.iter().flat_map(|(_, value)| identifiers(value)));
@@ -237,7 +237,7 @@ fn named_in(parameter: &str) -> Vec<String> {
     if found.is_empty() { vec![parameter.to_owned()] } else { found }
 }
 
-/// The identifiers in a text, in whatever spelling requests may use, as they stand in the record.
+/// The identifiers in a text, in the spelling of the record.
 fn identifiers(text: &str) -> impl Iterator<Item = String> {
     let parts = text.split(|c: char| !c.is_ascii_alphanumeric() && !matches!(c, '-' | '{' | '}' | ':'));
     parts.filter_map(|part| {

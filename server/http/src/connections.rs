@@ -35,7 +35,7 @@ const WANTED: u64 = 65_536;
 /// Limits of open connections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConnectionLimits {
-    /// In total.
+    /// Largest number of open connections in total.
     pub total: usize,
     /// Per IPv4 address or /64 network of IPv6. Trusted proxies are exempt.
     pub per_address: usize,

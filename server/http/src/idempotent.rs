@@ -187,7 +187,7 @@ impl<P: RequiredRight, S: Send + Sync> FromRequest<S> for Idempotent<P> {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Refusal> {
         let (idempotent, _, _, bytes) = read(request, state).await?;
-        // A field that nobody reads would be ignored without a word.
+        // An unread field would be ignored silently.
         if !matches!(bytes.trim_ascii(), b"" | b"{}") {
             return Err(Error::Malformed("This operation takes no fields. Send no body, or {}.".to_owned()).into());
         }

@@ -56,7 +56,7 @@ fn without_identifier(detail: &str) -> Option<String> {
     Some(format!("There is no such {what}, or you have no access to it."))
 }
 
-/// A heading for people, where that of the kind has words of HTTP.
+/// A plain heading for statuses whose problem title is HTTP jargon.
 fn title(status: StatusCode, detail: &str) -> Option<&'static str> {
     match status {
         StatusCode::CONFLICT if detail == StoreError::Withdrawn.to_string() => Some("Consent withdrawn"),

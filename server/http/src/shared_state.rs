@@ -92,7 +92,7 @@ impl AppState {
         Self { scheduler, access, requests, analyses, hosts, proxies, slowest_answer: SLOWEST_ANSWER, backups, store }
     }
 
-    /// What runs jobs.
+    /// The runners of jobs.
     pub fn runners(&self) -> Runners<'_> {
         Runners { scheduler: &self.scheduler, backups: &self.backups }
     }

@@ -23,7 +23,7 @@ struct UnwrittenRows {
     rows: HashMap<Access, Tally>,
     /// When each row was last written.
     written: HashMap<Access, Instant>,
-    /// A task writes what waits.
+    /// A background task writes the queued rows.
     is_kept: bool,
 }
 

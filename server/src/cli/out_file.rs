@@ -48,7 +48,7 @@ impl OutFile {
         Ok(Self { path, part: Some(part), file: Some(file) })
     }
 
-    /// The same for the file given to --out, without which a command writes to standard output.
+    /// Opens the file given to --out, without which a command writes to standard output.
     ///
     /// # Errors
     /// [`Error::Malformed`] with the reason when it cannot.
@@ -60,7 +60,7 @@ impl OutFile {
         path.map(|path| Self::open(path, inputs)).transpose()
     }
 
-    /// The same for a new file that only its owner can read.
+    /// Opens a new file that only its owner can read.
     ///
     /// # Errors
     /// [`Error::Malformed`] if the file exists or cannot be written.

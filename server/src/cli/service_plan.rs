@@ -54,7 +54,7 @@ impl ServicePlan {
         Ok(plan)
     }
 
-    /// Without sign-in, whoever reaches the service may change everything.
+    /// Without sign-in, anyone who reaches the service may change everything.
     fn refuse_strangers(&self, settings: &Settings) -> Result<(), Error> {
         if self.sign_in {
             return Ok(());

@@ -34,9 +34,9 @@ pub struct ChainEnd {
 /// The last rows of the chains of a record.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChainEnds {
-    /// Of the audit trail.
+    /// End of the chain of the audit trail.
     pub audit: ChainEnd,
-    /// Of the seals.
+    /// End of the chain of seals.
     pub seals: ChainEnd,
 }
 

@@ -107,7 +107,7 @@ pub async fn of_study(db: &mut Connection, study: StudyId) -> StoreResult<HashMa
     rows.iter().map(from_row).collect()
 }
 
-/// The same for a few trials, without those that have not converged.
+/// The states of the certificates of a few trials, without those that have not converged.
 ///
 /// # Errors
 /// Errors of the database.

@@ -109,7 +109,7 @@ pub async fn exists(db: &mut Connection, trial: TrialId) -> StoreResult<bool> {
     Ok(row.try_get(0)?)
 }
 
-/// Those of the trials whose gait, or last iterate, is in the record.
+/// The trials among these whose gait, or last iterate, is in the record.
 ///
 /// # Errors
 /// Errors of the database.

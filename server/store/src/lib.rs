@@ -115,7 +115,7 @@ use writer::{Outside, Writing};
 
 /// Least time between two probes.
 const PROBED_AGAIN: Duration = Duration::from_secs(1);
-/// Time and result of a probe whether the record can be written.
+/// When it was last tried whether the record can be written, and the result.
 type Probe = (std::time::Instant, Result<(), String>);
 
 /// Time limit of a probe.

@@ -11,7 +11,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-/// Variable that names the list of skipped tests. Whoever sets it prints the list.
+/// Variable that names the list of skipped tests. The program that sets it prints the list.
 pub const FILE: &str = "GAITWRIGHT_SKIPPED";
 
 /// Start of the names of the lists in the folder `target/tmp`.

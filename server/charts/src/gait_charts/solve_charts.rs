@@ -4,7 +4,7 @@ use crate::{Chart, Figure, Stroke};
 use gait_optimizer::IterationRecord;
 use gait_optimizer::solve::SolvePhase;
 
-/// In words.
+/// Name of a phase in a chart.
 fn phase_in_words(phase: SolvePhase) -> &'static str {
     match phase {
         SolvePhase::Tracking => "tracking",

@@ -191,7 +191,7 @@ fn gait_row(gait: &GaitUtility, analysis: &Analysis, snapshot: &StudySnapshot) -
     }
 }
 
-/// What Gait RMSE says of a gait beside the recommended one. `None` if it does not answer the comparisons alone.
+/// Whether Gait RMSE rates a gait worse than the recommended one. `None` unless Gait RMSE answers all comparisons.
 fn worse(gait: &GaitUtility, analysis: &Analysis, snapshot: &StudySnapshot) -> Option<&'static str> {
     if snapshot.study.plan.answer_source != AnswerSource::GaitRmse {
         return None;

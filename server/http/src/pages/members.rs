@@ -138,7 +138,7 @@ impl TypedForm for MembersForm {
     /// Only the lists have acceptable members and raters.
     fn repair(&mut self, field: &str) -> bool {
         match field {
-            // A name that nobody has.
+            // An unused name.
             "name" => self.name = MemberId::fresh().to_string(),
             "reason" => "a reason".clone_into(&mut self.reason),
             _ => return false,

@@ -140,7 +140,7 @@ impl TypedForm for UsersForm {
 
     fn repair(&mut self, field: &str) -> bool {
         match field {
-            // A name that nobody has.
+            // An unused name.
             "name" => self.name = UserId::fresh().to_string(),
             "role" => Role::Rater.as_str().clone_into(&mut self.role),
             "days" => self.days.clear(),

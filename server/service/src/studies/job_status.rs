@@ -31,7 +31,7 @@ pub struct JobStatus {
     pub solve: Option<OpenSolve>,
 }
 
-/// What runs jobs in this process.
+/// The runners of jobs in this process.
 #[derive(Debug, Clone, Copy)]
 pub struct Runners<'a> {
     /// Runs the jobs of trials.

@@ -16,8 +16,8 @@ pub fn best_trial(snapshot: &StudySnapshot, posterior: &Posterior) -> Result<Opt
     Ok(ranking(snapshot, posterior)?.first().copied())
 }
 
-/// The ranking for pages. Of a study whose posterior no request waits for, it has only the trial that was best when the
-/// newest one was proposed.
+/// The ranking for pages. If the study is too large to compute a posterior in a request, it has only the trial that was best
+/// at the time of the newest proposal.
 ///
 /// # Errors
 /// When the learner cannot work with the log.

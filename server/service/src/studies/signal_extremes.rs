@@ -8,7 +8,7 @@ pub(super) fn extremes(samples: &[f64]) -> Vec<(usize, f64)> {
     extremes_in(INTERVALS, samples)
 }
 
-/// The same for another number of intervals.
+/// The smallest and the largest sample of each of so many intervals, in order of time.
 pub(super) fn extremes_in(intervals: usize, samples: &[f64]) -> Vec<(usize, f64)> {
     let length = samples.len().div_ceil(intervals).max(1);
     let mut points = Vec::new();

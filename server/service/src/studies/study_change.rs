@@ -55,7 +55,7 @@ pub(super) fn check_filing(study: &Study) -> Result<(), Error> {
     Ok(())
 }
 
-/// A study as it becomes by a change.
+/// A study before and after a change.
 struct ChangedStudy {
     before: Study,
     limits: StudyLimits,

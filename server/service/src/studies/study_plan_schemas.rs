@@ -1,4 +1,4 @@
-//! Schemas of the parts of a study plan that commands receive and REST serves as other crates read and write them.
+//! OpenAPI schemas of the parts of a study plan whose types belong to other crates.
 
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -16,7 +16,7 @@ pub struct RandomDraw {
 
 /// The lead of one order over the other from which the coin is biased.
 const TOLERANCE: u64 = 3;
-/// Of 4 biased draws, those that even out the lead.
+/// How many of 4 biased draws even out the lead.
 const BIAS: u64 = 3;
 
 impl RandomDraw {

@@ -191,7 +191,7 @@ pub async fn comparisons(db: &mut Connection, study: StudyId, after: i64, limit:
     answers(db, study, false, after, limit).await
 }
 
-/// The same for suggestions.
+/// At most `limit` suggestions of a study after a sequence number, retracted ones included, in order.
 ///
 /// # Errors
 /// Errors of the database.

@@ -8,7 +8,7 @@ use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
 /// Which studies of those that a caller reaches.
 #[derive(Debug, Clone, Default)]
 pub struct StudyFilter {
-    /// Of this subject.
+    /// Only studies of this subject.
     pub subject: Option<SubjectId>,
     /// Whose name, tags, notes or pseudonym contain this text, whatever its case. Empty for all.
     pub text: String,

@@ -212,7 +212,7 @@ fn number<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<T, Error
     text.trim().parse().map_err(|_| Error::invalid(field, text, allowed))
 }
 
-/// The same for optional fields.
+/// Reads an optional number.
 fn optional<T: FromStr>(field: &str, text: &str, allowed: &str) -> Result<Option<T>, Error> {
     if text.trim().is_empty() { Ok(None) } else { number(field, text, allowed).map(Some) }
 }

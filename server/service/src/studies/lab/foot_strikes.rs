@@ -3,8 +3,8 @@
 /// Heel strikes of an EMG recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FootStrikes {
-    /// Those of the right foot, s.
+    /// Heel strikes of the right foot, s.
     pub right_s: Vec<f64>,
-    /// Those of the left foot, s; `None`: not recorded.
+    /// Heel strikes of the left foot, s; `None`: not recorded.
     pub left_s: Option<Vec<f64>>,
 }

@@ -27,7 +27,7 @@ pub(super) async fn answers(
     let id = study.id;
     let rows = at("feedback", feedback::of_study(db, id, 0).await)?;
     let assessments = at("assessments", assessments::of_study(db, id).await)?;
-    // Whoever has answered may still report a gait as unsafe.
+    // A safety report is allowed after an answer.
     let of_reports: HashSet<FeedbackId> = assessments.iter().filter_map(|assessment| assessment.feedback_id).collect();
     let mut labelled = 0;
     let mut answered: HashMap<_, usize> = HashMap::new();
