@@ -18,9 +18,9 @@ const MAX_LEVEL: f64 = 1e15;
 /// Smallest distance between two levels.
 const MIN_STEP: f64 = 1e-15;
 /// Shortest lengthscale, as a multiple of the smallest step: below it, levels are uncorrelated.
-const SHORTEST_LENGTHSCALE: f64 = 1e-2;
+const MIN_LENGTHSCALE: f64 = 1e-2;
 /// Longest lengthscale, as a multiple of the range: above it, correlations are 1 in double precision.
-const LONGEST_LENGTHSCALE: f64 = 1e4;
+const MAX_LENGTHSCALE: f64 = 1e4;
 
 /// One tuned quantity and its levels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,7 +61,7 @@ impl Dimension {
         }
         let (shortest, longest) = match self.values.len() {
             1 => (MIN_STEP, MAX_LEVEL),
-            _ => (SHORTEST_LENGTHSCALE * nearest, LONGEST_LENGTHSCALE * self.range()),
+            _ => (MIN_LENGTHSCALE * nearest, MAX_LENGTHSCALE * self.range()),
         };
         if !(self.lengthscale >= shortest && self.lengthscale <= longest) {
             return Err(LearnerError::InvalidLengthscale {

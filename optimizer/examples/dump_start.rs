@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let Some(guess) = InitialGuess::numbered(guess) else {
-        return Err(format!("--guess: 1 to {}", InitialGuess::MOST).into());
+        return Err(format!("--guess: 1 to {}", InitialGuess::MAX_GUESSES).into());
     };
     let mut problem = GaitProblem::new(Subject::builtin(subject)?, false)?;
     problem.bounds.a5 = a5;

@@ -19,7 +19,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Largest relative change.
-const LARGEST: f64 = 1e-10;
+const MAX_CHANGE: f64 = 1e-10;
 
 /// A cold start: subject, muscles, initial guess and number of the perturbation; 0 is the start itself.
 type Start = (u32, bool, InitialGuess, usize);
@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn solve((subject, muscles, guess, number): Start) -> Result<SolveReport, Box<dyn Error>> {
     let mut random = SplitMix(number as u64);
-    let mut factor = || if number == 0 { 1.0 } else { 1.0 + LARGEST * (random.below(2_000_001) as f64 / 1e6 - 1.0) };
+    let mut factor = || if number == 0 { 1.0 } else { 1.0 + MAX_CHANGE * (random.below(2_000_001) as f64 / 1e6 - 1.0) };
     let guess = InitialGuess {
         stride_time_s: guess.stride_time_s * factor(),
         stride_length_m: guess.stride_length_m * factor(),

@@ -26,7 +26,7 @@ use tuned_actions::LEVELS;
 /// Largest relative error of a pair that agrees.
 const AGREES: f64 = 1e-3;
 /// Smallest room to move in each direction, relative to the value of the bound.
-const LEAST_ROOM: f64 = 1e-6;
+const MIN_ROOM: f64 = 1e-6;
 
 /// Tight, and without tightening between nodes, so that solves differ in the moved bound alone.
 fn options() -> SolveOptions {
@@ -99,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         for (place, bound) in found.bounds.iter().enumerate().filter(|(_, bound)| !bound.active.is_empty()) {
             let step = step(bound);
-            if step < LEAST_ROOM * bound.value.abs().max(1e-2) {
+            if step < MIN_ROOM * bound.value.abs().max(1e-2) {
                 without_room += 1;
                 continue;
             }

@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let problem = GaitProblem { settings, bounds, ..GaitProblem::new(Subject::builtin(subject)?, muscles)? };
     let mut phases: Vec<(serde_json::Value, usize)> = Vec::new();
     let Some(guess) = InitialGuess::numbered(guess) else {
-        return Err(format!("--guess: 1 to {}", InitialGuess::MOST).into());
+        return Err(format!("--guess: 1 to {}", InitialGuess::MAX_GUESSES).into());
     };
     let outcome = solve_from_guesses(
         &problem,

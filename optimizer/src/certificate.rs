@@ -46,7 +46,7 @@ pub use closed_loop::STRIDES;
 pub use differences_from_defaults::Difference;
 pub use hybrid_walker::Fall;
 pub use identity::CertifiedGait;
-pub use push::{LARGEST_PUSH_M_S, Pushes, RECOVERY_STRIDES};
+pub use push::{MAX_PUSH_M_S, Pushes, RECOVERY_STRIDES};
 pub use return_map::{FixedPointDistance, FloquetMultiplier, ReturnMap};
 
 use crate::body::WalkerModel;

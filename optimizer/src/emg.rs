@@ -18,7 +18,7 @@ mod raw_signal_checks;
 
 pub use activity::Activity;
 pub use cycle_activity::{CYCLE_POINTS, CycleActivity};
-pub use emg_recording::{EmgRecording, HIGHEST_RATE_HZ};
+pub use emg_recording::{EmgRecording, MAX_RATE_HZ};
 pub use emg_rmse::{EmgRmse, emg_rmse};
 pub use envelope::Envelope;
 pub use filter_settings::EmgSettings;

@@ -51,11 +51,11 @@ const STRIDES_BEFORE_PUSH: f64 = 3.2;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExecutionOptions {
-    /// Number of simulated walks on each kind of ground, 1 to [`Self::MOST_SIMULATED_WALKS`].
+    /// Number of simulated walks on each kind of ground, 1 to [`Self::MAX_SIMULATED_WALKS`].
     pub number_of_simulated_walks: u32,
     /// Strides of a complete walk, 1 to 1000.
     pub strides: u32,
-    /// Largest height and depth of the plateaus of each ground, m; 0 to [`Self::HIGHEST_GROUND_M`].
+    /// Largest height and depth of the plateaus of each ground, m; 0 to [`Self::MAX_GROUND_M`].
     pub ground_heights_m: Vec<f64>,
     /// Seed of the disturbances.
     pub seed: u64,
@@ -77,9 +77,9 @@ impl Default for ExecutionOptions {
 
 impl ExecutionOptions {
     /// Largest number of simulated walks on a ground.
-    pub const MOST_SIMULATED_WALKS: u32 = 100_000;
+    pub const MAX_SIMULATED_WALKS: u32 = 100_000;
     /// Largest height and depth of the ground, m.
-    pub const HIGHEST_GROUND_M: f64 = 0.05;
+    pub const MAX_GROUND_M: f64 = 0.05;
 
     /// Number of walks with random disturbances, over all grounds.
     pub fn random_walks(&self) -> u32 {
@@ -96,12 +96,12 @@ impl ExecutionOptions {
             "number_of_simulated_walks",
             f64::from(self.number_of_simulated_walks),
             1.0,
-            f64::from(Self::MOST_SIMULATED_WALKS),
+            f64::from(Self::MAX_SIMULATED_WALKS),
         )?;
         ModelError::check_range("strides", f64::from(self.strides), 1.0, 1e3)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 64.0)?;
         for height in &self.ground_heights_m {
-            ModelError::check_range("ground_heights_m", *height, 0.0, Self::HIGHEST_GROUND_M)?;
+            ModelError::check_range("ground_heights_m", *height, 0.0, Self::MAX_GROUND_M)?;
         }
         Ok(())
     }

@@ -7,7 +7,7 @@
 use crate::angle_table::{AngleColumn, AngleTable};
 use crate::model_error::ModelError;
 use crate::opensim_reading::{AngleUnit, StorageFile};
-use crate::reference::{LARGEST_ANGLE_RAD, MotionRecording};
+use crate::reference::{MAX_ANGLE_RAD, MotionRecording};
 use crate::signal_filter::{extension, filter, low_pass};
 use crate::statistics::extremes;
 use crate::table::{Separator, Table, TimeColumn, lines_of};
@@ -16,13 +16,13 @@ use serde::{Deserialize, Serialize};
 /// Order of one pass of the low-pass.
 const ORDER: usize = 4;
 /// Longest gap between two rows that is interpolated, s.
-const LONGEST_GAP_S: f64 = 0.05;
+const MAX_GAP_S: f64 = 0.05;
 /// Shortest recording that shows a limit cycle, s: more than one stride. The paper shows ten seconds.
-const SHORTEST_S: f64 = 2.0;
+const MIN_RECORDING_S: f64 = 2.0;
 /// Rounding error of a difference of times, s.
 const ROUNDING_S: f64 = 1e-9;
 /// Largest range of motion of a joint at rest, rad.
-const STILL_RAD: f64 = 0.05;
+const MAX_RANGE_AT_REST_RAD: f64 = 0.05;
 
 pub use crate::reference::JOINTS;
 
@@ -127,20 +127,19 @@ impl JointRecording {
             return Err(table.malformed_names(reason));
         }
         for (joint, angles) in &joints {
-            if let Some(row) = angles.iter().position(|angle| angle.abs() > LARGEST_ANGLE_RAD) {
+            if let Some(row) = angles.iter().position(|angle| angle.abs() > MAX_ANGLE_RAD) {
                 let angle = angles[row];
                 let reason = format!(
-                    "{joint} is {angle:.1} rad; plausible angles are at most {LARGEST_ANGLE_RAD:.2} rad in either direction; \
+                    "{joint} is {angle:.1} rad; plausible angles are at most {MAX_ANGLE_RAD:.2} rad in either direction; \
                      check the unit"
                 );
                 return Err(table.malformed_row(row, None, reason));
             }
         }
         let times = table.times();
-        if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > LONGEST_GAP_S + ROUNDING_S) {
+        if let Some(row) = times.windows(2).position(|pair| pair[1] - pair[0] > MAX_GAP_S + ROUNDING_S) {
             let gap_s = times[row + 1] - times[row];
-            let reason =
-                format!("there is a gap of {gap_s:.3} s between rows; gaps may be at most {LONGEST_GAP_S} s long");
+            let reason = format!("there is a gap of {gap_s:.3} s between rows; gaps may be at most {MAX_GAP_S} s long");
             return Err(table.malformed_row(row + 1, Some(1), reason));
         }
         let rate_hz = (times.len() - 1) as f64 / (times[times.len() - 1] - times[0]);
@@ -165,8 +164,8 @@ impl JointRecording {
     fn too_short(&self) -> Option<String> {
         let samples = self.joints.first().map_or(0, |(_, angles)| angles.len());
         let lasts = samples.saturating_sub(1) as f64 / self.rate_hz;
-        (lasts < SHORTEST_S - ROUNDING_S)
-            .then(|| format!("the recording lasts {lasts:.3} s; a limit cycle needs at least {SHORTEST_S} s"))
+        (lasts < MIN_RECORDING_S - ROUNDING_S)
+            .then(|| format!("the recording lasts {lasts:.3} s; a limit cycle needs at least {MIN_RECORDING_S} s"))
     }
 
     fn still(&self) -> Option<String> {
@@ -175,8 +174,8 @@ impl JointRecording {
             highest - lowest
         };
         let most = self.joints.iter().map(|(_, angles)| range(angles)).fold(0.0, f64::max);
-        (most <= STILL_RAD).then(|| {
-            format!("no joint moves by more than {STILL_RAD} rad (the largest range is {most:.3} rad); check the unit")
+        (most <= MAX_RANGE_AT_REST_RAD).then(|| {
+            format!("no joint moves by more than {MAX_RANGE_AT_REST_RAD} rad (the largest range is {most:.3} rad); check the unit")
         })
     }
 

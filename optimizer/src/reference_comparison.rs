@@ -10,7 +10,7 @@ use crate::reference::ReferenceGait;
 use serde::Serialize;
 
 /// Largest shift of the reference gait in the alignment, in fractions of the stride.
-const LARGEST_SHIFT: f64 = 0.1;
+const MAX_SHIFT: f64 = 0.1;
 /// Number of shifts on each side of zero.
 const SHIFTS: i32 = 40;
 
@@ -55,7 +55,7 @@ fn compare(gait: &Gait, reference: &ReferenceGait, of_the_problem: bool) -> Refe
     let (shift, aligned) = (0..=SHIFTS)
         .flat_map(|step| if step == 0 { vec![0] } else { vec![step, -step] })
         .map(|step| {
-            let shift = LARGEST_SHIFT * f64::from(step) / f64::from(SHIFTS);
+            let shift = MAX_SHIFT * f64::from(step) / f64::from(SHIFTS);
             (shift, gait_rmse_with_shift(gait, reference, shift).total)
         })
         .fold((0.0, raw.total), |best, next| if next.1 < best.1 { next } else { best });

@@ -42,7 +42,7 @@ const DOMAIN: &str = "domain";
 const SAME_TIME_S: f64 = 1e-9;
 
 /// Smallest number of rows of a table.
-const FEWEST_ROWS: usize = 20;
+const MIN_ROWS: usize = 20;
 
 /// Largest deviation of a row from an even grid, in sampling intervals.
 const UNEVENNESS: f64 = 0.5;
@@ -129,8 +129,8 @@ impl Table {
             table.add_row(first_line + 1 + index, &cells, word != before)?;
             word.clone_into(&mut before);
         }
-        if table.rows.len() < FEWEST_ROWS {
-            let reason = format!("the number of rows is {}; it must be at least {FEWEST_ROWS}", table.rows.len());
+        if table.rows.len() < MIN_ROWS {
+            let reason = format!("the number of rows is {}; it must be at least {MIN_ROWS}", table.rows.len());
             return Err(malformed(first_line + filled, reason));
         }
         Ok(table)

@@ -35,7 +35,7 @@ pub struct Knowledge {
 }
 
 /// Number of gaits from which on a dimension that was active in none of them is ignored.
-const FEWEST_GAITS: usize = 2;
+const MIN_GAITS: usize = 2;
 /// Factor on the lengthscale of a dimension that the learner ignores: its levels are fully correlated.
 const IGNORED: f64 = 1e4;
 
@@ -54,7 +54,7 @@ impl Problem {
     /// The search space of the learner after these actions.
     pub fn space_after(&self, visited: &[ActionIndex], knowledge: Knowledge) -> Result<SearchSpace, LearnerError> {
         let gaits: Vec<&GaitOfAction> = self.gaits_of(visited).collect();
-        if !knowledge.inactive || gaits.len() < FEWEST_GAITS {
+        if !knowledge.inactive || gaits.len() < MIN_GAITS {
             return Ok(self.space.clone());
         }
         let mut dimensions = self.space.dimensions().to_vec();

@@ -52,7 +52,7 @@ enum Problem {
     Warm(Box<GaitProblem>, Box<WarmStart>),
 }
 
-const MOST_ITERATIONS: usize = 500;
+const MAX_ITERATIONS: usize = 500;
 
 /// `cold` and `tight` random actions from one initial guess, `warm` random changes of two bounds.
 pub(crate) fn all(
@@ -98,7 +98,7 @@ pub(crate) fn all(
 }
 
 fn options() -> SolveOptions {
-    SolveOptions { initial_guesses: 1, retry: false, max_iterations: MOST_ITERATIONS, ..SolveOptions::default() }
+    SolveOptions { initial_guesses: 1, retry: false, max_iterations: MAX_ITERATIONS, ..SolveOptions::default() }
 }
 
 /// Processor time of this thread so far.
@@ -113,7 +113,7 @@ impl Instance {
         let settings = if is_gait {
             options().solver
         } else {
-            NlpSettings { max_iterations: MOST_ITERATIONS, ..NlpSettings::default() }
+            NlpSettings { max_iterations: MAX_ITERATIONS, ..NlpSettings::default() }
         };
         let mut target = Target { settings, guess: InitialGuess::NATURAL, is_gait };
         change(&mut target);

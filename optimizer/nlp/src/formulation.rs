@@ -155,12 +155,12 @@ impl<'p> Formulation<'p> {
     /// Gradient-based scaling: scales objective and rows down until no derivative at `x` exceeds `limit` (WB06
     /// section 3.8).
     pub(crate) fn scale_by_gradients(&mut self, x: &[f64], limit: f64) {
-        const SMALLEST: f64 = 1e-8;
+        const MIN_SCALE: f64 = 1e-8;
         let mut gradient = vec![0.0; self.length()];
         self.gradient(x, &mut gradient);
         let largest = gradient[..self.n].iter().fold(0.0f64, |a, v| a.max(v.abs()));
         if largest.is_finite() && largest > limit {
-            self.objective_scale = (limit / largest).max(SMALLEST);
+            self.objective_scale = (limit / largest).max(MIN_SCALE);
         }
         let mut values = vec![0.0; self.program.jacobian_pattern().row_indices.len()];
         self.jacobian(x, &mut values);
@@ -170,7 +170,7 @@ impl<'p> Formulation<'p> {
         }
         for i in 0..self.m {
             if largest[i].is_finite() && largest[i] > limit {
-                let scale = (limit / largest[i]).max(SMALLEST);
+                let scale = (limit / largest[i]).max(MIN_SCALE);
                 self.row_scale[i] = scale;
                 match &mut self.rows[i] {
                     RowForm::Equality(target) => *target *= scale,

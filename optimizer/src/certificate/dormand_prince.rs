@@ -58,7 +58,7 @@ const D: [f64; 7] = [
 const SAFETY: f64 = 0.9;
 const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Smallest step, s: far below the shortest domain (5 ms) and far above the rounding error.
-const SMALLEST_STEP_S: f64 = 1e-11;
+const MIN_STEP_S: f64 = 1e-11;
 
 /// A step with its dense output.
 pub(super) struct DenseStep<const N: usize> {
@@ -151,7 +151,7 @@ impl<'a, const N: usize, S: System<N>> Integrator<'a, N, S> {
     /// The next step that keeps the tolerance.
     pub(super) fn step(&mut self) -> Result<DenseStep<N>, StepError> {
         loop {
-            if self.next_length < SMALLEST_STEP_S {
+            if self.next_length < MIN_STEP_S {
                 return Err(StepError::TooSmall);
             }
             let step = DenseStep::take(self.system, &self.state, &self.derivative, self.next_length)?;

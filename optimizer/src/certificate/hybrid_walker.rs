@@ -56,11 +56,11 @@ pub(super) struct CompletedDomain {
 }
 
 /// Longest duration of a domain, as a multiple of the planned one.
-const LONGEST: f64 = 2.0;
+const MAX_DURATION_RATIO: f64 = 2.0;
 /// Longest integration step, as a fraction of the planned duration.
-const LONGEST_STEP: f64 = 0.1;
+const MAX_STEP: f64 = 0.1;
 /// Number of evaluations of the guard within a step.
-const GUARD_LOOKS: usize = 8;
+const GUARD_EVALUATIONS: usize = 8;
 /// Number of refinements of an event; each squares the error.
 const EVENT_REFINEMENTS: usize = 4;
 
@@ -182,16 +182,16 @@ impl<'a> HybridWalker<'a> {
             return Err(Fall::BeginsBeyondGuard { domain: name, amount: -last });
         }
         let planned = control.nominal_duration;
-        let mut integrator = Integrator::new(system, start, self.tolerance, LONGEST_STEP * planned).map_err(failed)?;
+        let mut integrator = Integrator::new(system, start, self.tolerance, MAX_STEP * planned).map_err(failed)?;
         let mut elapsed = 0.0;
         watch(d, elapsed, &walker_part(start));
-        while elapsed < LONGEST * planned {
+        while elapsed < MAX_DURATION_RATIO * planned {
             let step = integrator.step().map_err(failed)?;
-            for look in 1..=GUARD_LOOKS {
-                let share = look as f64 / GUARD_LOOKS as f64;
+            for look in 1..=GUARD_EVALUATIONS {
+                let share = look as f64 / GUARD_EVALUATIONS as f64;
                 let value = guard(&step.at(share))?;
                 if value <= 0.0 {
-                    let from = share - 1.0 / GUARD_LOOKS as f64;
+                    let from = share - 1.0 / GUARD_EVALUATIONS as f64;
                     let guess = from + (share - from) * last / (last - value);
                     let event = refine(control, system, &step, guess * step.length)?;
                     watch(d, elapsed + event.length, &walker_part(&event.end));

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Domain of the push: SS2_R.
 const PUSHED_DOMAIN: usize = 2;
 /// Largest push in the search, m/s.
-pub const LARGEST_PUSH_M_S: f64 = 1.0;
+pub const MAX_PUSH_M_S: f64 = 1.0;
 /// Resolution of the search, m/s.
 const RESOLUTION_M_S: f64 = 0.01;
 /// Number of strides within which the walker must recover.
@@ -22,7 +22,7 @@ pub const RECOVERY_STRIDES: usize = 10;
 /// Largest distance from the periodic motion after a recovery, rad and rad/s.
 const RECOVERED: f64 = 1e-3;
 
-/// Largest changes of the forward hip velocity from which the walker recovers, m/s; at most [`LARGEST_PUSH_M_S`].
+/// Largest changes of the forward hip velocity from which the walker recovers, m/s; at most [`MAX_PUSH_M_S`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pushes {
     /// Forwards.
@@ -85,7 +85,7 @@ pub(super) fn pushes(walker: &HybridWalker<'_>, periodic: &State) -> Result<Push
     // A fall means that the walker does not recover.
     let survives = |change: f64| recovers(&walker, periodic, &at_push, change).unwrap_or(false);
     let largest = |direction: f64| {
-        let (mut good, mut bad) = (0.0, LARGEST_PUSH_M_S);
+        let (mut good, mut bad) = (0.0, MAX_PUSH_M_S);
         if survives(direction * bad) {
             return bad;
         }

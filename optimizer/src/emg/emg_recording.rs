@@ -3,13 +3,13 @@
 use super::muscle_of;
 use crate::model_error::ModelError;
 use crate::opensim_reading::StorageFile;
-use crate::reference::{SHORTEST_CONTACT_S, SHORTEST_SWING_S, contacts, given};
+use crate::reference::{MIN_CONTACT_S, MIN_SWING_S, contacts, given};
 use crate::table::{Separator, Table, TimeColumn, lines_of};
 
 /// Lowest sampling rate of a file without a time column, Hz.
-const LOWEST_RATE_HZ: f64 = 100.0;
+const MIN_RATE_HZ: f64 = 100.0;
 /// Highest sampling rate of a file without a time column, Hz. At this rate filter settings have their widest ranges.
-pub const HIGHEST_RATE_HZ: f64 = 20_000.0;
+pub const MAX_RATE_HZ: f64 = 20_000.0;
 
 /// Raw signals of several channels with common times.
 #[derive(Debug, Clone, PartialEq)]
@@ -137,7 +137,7 @@ impl EmgRecording {
             };
             let reason = format!(
                 "column {column:?} has {found}; a stride needs two. A heel strike is a rise above {threshold} that lasts at least \
-                 {SHORTEST_CONTACT_S} s, after at least {SHORTEST_SWING_S} s below"
+                 {MIN_CONTACT_S} s, after at least {MIN_SWING_S} s below"
             );
             return Err(ModelError::Malformed { what: what.to_owned(), reason });
         }
@@ -154,5 +154,5 @@ impl EmgRecording {
 }
 
 fn checked_rate(rate_hz: f64) -> Result<f64, ModelError> {
-    ModelError::check_range("rate_hz", rate_hz, LOWEST_RATE_HZ, HIGHEST_RATE_HZ)
+    ModelError::check_range("rate_hz", rate_hz, MIN_RATE_HZ, MAX_RATE_HZ)
 }

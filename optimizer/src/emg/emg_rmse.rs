@@ -17,12 +17,12 @@ pub struct EmgRmse {
 }
 
 /// Ratio of peaks above which a channel is doubtful.
-const LARGEST_PEAK: f64 = 10.0;
+const MAX_PEAK_RATIO: f64 = 10.0;
 
 /// The warning for a channel that is implausibly more active than in normal walking.
 fn doubt(activity: &CycleActivity, normal: &CycleActivity) -> Option<String> {
     let times = activity.peak() / normal.peak();
-    (times > LARGEST_PEAK).then(|| {
+    (times > MAX_PEAK_RATIO).then(|| {
         let name = &activity.channel;
         format!("the peak of {name} is {times:.1} times that of the walk without the device; check that both recordings have the same unit")
     })

@@ -4,9 +4,9 @@ use crate::model_error::ModelError;
 use serde::{Deserialize, Serialize};
 
 /// Highest lower edge of the band-pass, and highest edge of the envelope, Hz.
-const HIGHEST_LOW_HZ: f64 = 450.0;
+const MAX_LOW_HZ: f64 = 450.0;
 /// Highest upper edge of the band-pass, Hz: muscles have no activity above it.
-const HIGHEST_HZ: f64 = 1000.0;
+const MAX_BAND_EDGE_HZ: f64 = 1000.0;
 
 /// Settings of the filters. The order is that of one pass and edge; forward and backward pass together have twice the
 /// order.
@@ -36,7 +36,7 @@ impl EmgSettings {
     /// [`ModelError::OutOfRange`] with the field.
     pub fn validate(&self, rate_hz: f64) -> Result<(), ModelError> {
         let half = 0.5 * rate_hz;
-        let (low, high) = ((0.9 * half).min(HIGHEST_LOW_HZ), (0.99 * half).min(HIGHEST_HZ));
+        let (low, high) = ((0.9 * half).min(MAX_LOW_HZ), (0.99 * half).min(MAX_BAND_EDGE_HZ));
         ModelError::check_range("emg.band_low_hz", self.band_low_hz, 1.0, low)?;
         let above_low = (self.band_low_hz + 1.0, high);
         ModelError::check_related_range(

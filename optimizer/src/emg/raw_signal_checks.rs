@@ -11,10 +11,10 @@ const FARTHEST_SAMPLE: f64 = 100.0;
 const NEAR_ZERO: f64 = 0.1;
 /// ... and the share of such samples from which a non-negative signal counts as rectified. For noise it is 8 %; a raw
 /// signal with an offset has almost none.
-const OFTEN: f64 = 0.02;
+const MIN_SIGN_CHANGE_SHARE: f64 = 0.02;
 /// Smallest share of the RMS of a raw signal within the band of the filter. White noise has about 90 %, an envelope of
 /// 6 to 10 Hz a few per cent.
-const LEAST_IN_BAND: f64 = 0.1;
+const MIN_IN_BAND: f64 = 0.1;
 
 impl EmgRecording {
     /// Checks that each channel is a raw muscle signal: not constant, without outliers, neither rectified nor smoothed.
@@ -67,12 +67,12 @@ impl EmgRecording {
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
         let about_mean: Vec<f64> = samples.iter().map(|sample| sample - mean).collect();
         let share = rms(&signal_filter::filter(&band, &about_mean)) / rms(&about_mean);
-        (share < LEAST_IN_BAND).then(|| {
+        (share < MIN_IN_BAND).then(|| {
             format!(
                 "only {:.1} % of the signal (RMS) is between {band_low_hz} and {band_high_hz} Hz; a raw signal has at least \
                  {:.0} %. This looks like an envelope or a movement artefact; upload the raw signal",
                 100.0 * share,
-                100.0 * LEAST_IN_BAND
+                100.0 * MIN_IN_BAND
             )
         })
     }
@@ -85,7 +85,7 @@ fn rectified(samples: &[f64]) -> Option<String> {
     }
     let near = NEAR_ZERO * rms(samples);
     let share = samples.iter().filter(|sample| **sample <= near).count() as f64 / samples.len() as f64;
-    (share >= OFTEN).then(|| {
+    (share >= MIN_SIGN_CHANGE_SHARE).then(|| {
         format!(
             "the signal is never negative and often near zero ({:.0} % of the samples). It looks rectified, but the raw signal \
              is needed",

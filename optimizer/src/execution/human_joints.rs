@@ -38,7 +38,7 @@ const LIGHT_N: f64 = 50.0;
 const PASSIVE_DAMPING_N_M_S_RAD: f64 = 1.0;
 
 /// Smallest planned rate of the hip position that tells the time, m/s.
-const SLOWEST_HIP_M_S: f64 = 0.1;
+const MIN_HIP_M_S: f64 = 0.1;
 /// First domain of the stance of the left leg.
 const LEFT_STANCE: usize = 4;
 
@@ -105,7 +105,7 @@ impl<'a> Human<'a> {
             measured: along(&motion.q),
             planned: along(&planned.q),
             planned_rate: along(&planned.qd),
-            slowest: SLOWEST_HIP_M_S,
+            slowest: MIN_HIP_M_S,
         };
         self.clock.advance(CONTROL_PERIOD_S, end_s, Some(phase));
         let planned = self.plan.at(self.clock.time_s);

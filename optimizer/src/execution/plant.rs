@@ -20,7 +20,7 @@ const ITERATIONS: usize = 30;
 /// Largest number of halvings of a step whose iterations do not converge.
 const HALVINGS: u32 = 8;
 /// Smallest fraction of an iteration of Newton's method.
-const SHORTEST: f64 = 1e-3;
+const MIN_NEWTON_FRACTION: f64 = 1e-3;
 
 /// Stiffness of a joint stop, N m/rad (assumption: 1 degree under 50 N m).
 const STOP_STIFFNESS_N_M_RAD: f64 = 3000.0;
@@ -180,7 +180,7 @@ impl<'a> Plant<'a> {
             let change = matrix.lu().solve(&-r)?;
             let mut fraction = 1.0;
             let (mut next, mut next_r) = (v + change, residual(&(v + change)));
-            while next_r.norm() > r.norm() && fraction > SHORTEST {
+            while next_r.norm() > r.norm() && fraction > MIN_NEWTON_FRACTION {
                 fraction *= 0.5;
                 next = v + change * fraction;
                 next_r = residual(&next);

@@ -16,11 +16,11 @@ use crate::subject::Subject;
 pub(super) const PLANT_STEPS: u32 = 2;
 
 /// Hip height below which the walker has fallen, relative to the lowest of the gait.
-const LOWEST_HIP: f64 = 0.8;
+const MIN_HIP: f64 = 0.8;
 /// Torso lean beyond which the walker has fallen, rad.
-const LARGEST_LEAN_RAD: f64 = 1.0;
+const MAX_LEAN_RAD: f64 = 1.0;
 /// Time without a heel strike after which the walker has halted, in strides.
-const LONGEST_STEP: f64 = 1.5;
+const MAX_STEP: f64 = 1.5;
 
 /// How a simulated walk ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +74,7 @@ impl<'a> SimulatedWalker<'a> {
             gait,
             plan: PlannedStride::new(gait),
             model,
-            lowest_hip_m: LOWEST_HIP * lowest,
+            lowest_hip_m: MIN_HIP * lowest,
             foothold_m,
             plant_steps: PLANT_STEPS,
         })
@@ -135,7 +135,7 @@ impl<'a> SimulatedWalker<'a> {
                 break;
             };
             motion = moved;
-            if elapsed_s - last_strike_s > LONGEST_STEP * self.plan.duration_s {
+            if elapsed_s - last_strike_s > MAX_STEP * self.plan.duration_s {
                 outcome.end = WalkEnd::Halted;
                 break;
             }
@@ -164,6 +164,6 @@ impl<'a> SimulatedWalker<'a> {
 
     fn is_upright(&self, plant: &Plant<'_>, motion: &PlantMotion) -> bool {
         let height = motion.q[1] - plant.ground_height(motion);
-        height >= self.lowest_hip_m && motion.q[2].abs() <= LARGEST_LEAN_RAD
+        height >= self.lowest_hip_m && motion.q[2].abs() <= MAX_LEAN_RAD
     }
 }

@@ -10,12 +10,12 @@ use crate::body::LegGeometry;
 /// Rate at which an error of the phase decays, 1/s.
 const CORRECTION_RATE_1_S: f64 = 30.0;
 /// Largest correction, in seconds per second.
-const LARGEST_CORRECTION: f64 = 1.0;
+const MAX_CORRECTION: f64 = 1.0;
 
 /// Smallest planned rate of the hip position that tells the time, m/s.
-const SLOWEST_HIP_M_S: f64 = 0.3;
+const MIN_HIP_M_S: f64 = 0.3;
 /// Smallest planned rate of the thigh angle that tells the time, rad/s.
-const SLOWEST_THIGH_RAD_S: f64 = 1.0;
+const MIN_THIGH_RAD_S: f64 = 1.0;
 /// Share of a section after which a loaded swing foot has landed.
 const LANDING: f64 = 0.5;
 
@@ -42,13 +42,13 @@ impl StridePhase {
             measured: hip_position(leg, measured.0, measured.1),
             planned: hip_position(leg, thigh, joints),
             planned_rate: hip_position(leg, thigh_rate, joint_rates),
-            slowest: SLOWEST_HIP_M_S,
+            slowest: MIN_HIP_M_S,
         }
     }
 
     /// The angle of the thigh of the prosthesis, rad. The planned angle comes with its rate.
     pub(super) fn of_thigh_angle(measured: f64, (planned, planned_rate): (f64, f64)) -> Self {
-        Self { measured, planned, planned_rate, slowest: SLOWEST_THIGH_RAD_S }
+        Self { measured, planned, planned_rate, slowest: MIN_THIGH_RAD_S }
     }
 }
 
@@ -81,7 +81,7 @@ impl StrideClock {
     pub(super) fn advance(&mut self, period_s: f64, end_s: f64, phase: Option<StridePhase>) {
         let correction = phase.filter(|phase| phase.planned_rate.abs() >= phase.slowest).map_or(0.0, |phase| {
             let late_s = (phase.measured - phase.planned) / phase.planned_rate;
-            (CORRECTION_RATE_1_S * late_s).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION)
+            (CORRECTION_RATE_1_S * late_s).clamp(-MAX_CORRECTION, MAX_CORRECTION)
         });
         self.time_s = (self.time_s + period_s * (1.0 + correction)).min(end_s).max(self.time_s);
     }

@@ -14,7 +14,7 @@ use interior_point::NonlinearProgram;
 use std::cell::RefCell;
 
 /// Largest number of bounds in a joint relaxation.
-const MOST_BOUNDS_RELAXED_TOGETHER: usize = 3;
+const MAX_BOUNDS_RELAXED_TOGETHER: usize = 3;
 /// Largest number of violations of a conflict that are kept.
 const VIOLATIONS: usize = 5;
 
@@ -173,7 +173,7 @@ pub(super) fn search_into(
     let found = {
         let search = RefCell::new(&mut search);
         let gives_a_gait = |set| Ok::<_, SearchEnd>(search.borrow_mut().level(set)?.is_some());
-        remedies(first, MOST_BOUNDS_RELAXED_TOGETHER, gives_a_gait, |without| search.borrow_mut().conflict(without))?
+        remedies(first, MAX_BOUNDS_RELAXED_TOGETHER, gives_a_gait, |without| search.borrow_mut().conflict(without))?
     };
     for (conflict, without) in found.conflicts {
         explanation.conflicts.push(search.described(conflict, without)?);

@@ -15,7 +15,7 @@ const COLD: [InitialGuess; 3] = [InitialGuess::NATURAL, InitialGuess::EARLY_RISE
 const MAX_ITERATIONS: usize = 400;
 const MAX_ITERATIONS_WARM: usize = 250;
 /// Distance from the bounds of the nearest gait above which a solve takes two steps.
-const FAR: f64 = 0.5;
+const TWO_STEP_DISTANCE: f64 = 0.5;
 
 /// The reason for an early end of the search.
 pub(super) enum SearchEnd {
@@ -136,7 +136,7 @@ impl<'a> Solves<'a> {
                 return Ok(self.latest());
             }
             let middle = halfway(&from, bounds)?;
-            if distance(&from, bounds) > FAR
+            if distance(&from, bounds) > TWO_STEP_DISTANCE
                 && self.warm(&middle, &gait, &mut FailedSearch::new(&middle))?
                 && let Some(gait) = self.latest()
                 && self.warm(bounds, &gait, &mut unmet)?

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Largest margin, as a share of the range.
-const LARGEST_SHARE: f64 = 0.25;
+const MAX_SHARE: f64 = 0.25;
 
 /// Margins of variables and rows, in scaled units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -94,7 +94,7 @@ impl Margins {
     /// Tightens bounds of variables by at most a share of their range, those of fixed variables not at all.
     pub(super) fn tighten_variables(&self, lower: &mut [f64], upper: &mut [f64]) {
         for (&at, [low, high]) in &self.variables {
-            let most = LARGEST_SHARE * (upper[at] - lower[at]);
+            let most = MAX_SHARE * (upper[at] - lower[at]);
             lower[at] += low.min(most);
             upper[at] -= high.min(most);
         }

@@ -13,9 +13,9 @@ const NO_FORCE: &str =
 /// Vertical force above which the foot is in contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
 /// Shortest time without contact before a heel strike, s.
-pub(crate) const SHORTEST_SWING_S: f64 = 0.1;
+pub(crate) const MIN_SWING_S: f64 = 0.1;
 /// Shortest contact, s. Noise and vibration of an unloaded plate are shorter.
-pub(crate) const SHORTEST_CONTACT_S: f64 = 0.05;
+pub(crate) const MIN_CONTACT_S: f64 = 0.05;
 /// Rounding error of a difference of times, s.
 pub(super) const ROUNDING_S: f64 = 1e-9;
 /// Half width of the window in which a heel strike by kinematics is the maximum, s.
@@ -45,7 +45,7 @@ pub(crate) fn contacts(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<f6
         let k = contact.start;
         if let Some(since) = unloaded_since
             && k > 0
-            && time_s[k] - since >= SHORTEST_SWING_S - ROUNDING_S
+            && time_s[k] - since >= MIN_SWING_S - ROUNDING_S
         {
             let (before, earlier) = (signal[k - 1], time_s[k - 1]);
             strikes.push(earlier + (time_s[k] - earlier) * (threshold - before) / (signal[k] - before));
@@ -61,7 +61,7 @@ fn loaded(time_s: &[f64], signal: &[f64], threshold: f64) -> Vec<Range<usize>> {
     let mut start = 0;
     for samples in signal.chunk_by(|a, b| (*a < threshold) == (*b < threshold)) {
         let end = start + samples.len();
-        if samples[0] >= threshold && time_s[end - 1] - time_s[start] >= SHORTEST_CONTACT_S - ROUNDING_S {
+        if samples[0] >= threshold && time_s[end - 1] - time_s[start] >= MIN_CONTACT_S - ROUNDING_S {
             contacts.push(start..end);
         }
         start = end;

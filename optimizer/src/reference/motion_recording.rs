@@ -1,6 +1,6 @@
 //! A recording of joint angles over several strides, converted to the convention of the walker.
 
-use super::reference_gait::{LARGEST_ANGLE_RAD, REFERENCE_COLUMNS};
+use super::reference_gait::{MAX_ANGLE_RAD, REFERENCE_COLUMNS};
 use crate::angle_table::{AngleColumn, AngleTable};
 use crate::model_error::ModelError;
 use crate::opensim_reading::{AngleUnit, StorageFile};
@@ -12,10 +12,10 @@ const KNEE: usize = 2;
 /// The columns of OpenSim's gait models without which a file is no reference gait.
 const OPENSIM_COLUMNS: [&str; 5] = ["pelvis_tilt", "hip_flexion_l", "knee_angle_l", "ankle_angle_l", "hip_flexion_r"];
 /// Smallest range of motion of a walking knee, rad. Radians taken for degrees are below.
-const SMALLEST_KNEE_RANGE_RAD: f64 = 0.1;
+const MIN_KNEE_RANGE_RAD: f64 = 0.1;
 /// Largest plausible angular velocity between two rows, rad/s. A knee in swing reaches about 7; marker noise adds to
 /// it.
-const LARGEST_SPEED_RAD_S: f64 = 40.0;
+const MAX_SPEED_RAD_S: f64 = 40.0;
 
 /// Joint angles over time in the convention of the walker: torso, hip_L, knee_L, ankle_L and hip_R, rad.
 #[derive(Debug, Clone, PartialEq)]
@@ -214,10 +214,10 @@ impl MotionRecording {
         steps: Vec<String>,
     ) -> Result<Self, ModelError> {
         for (column, name) in angles.iter().zip(REFERENCE_COLUMNS) {
-            if let Some(row) = column.iter().position(|a| a.abs() > LARGEST_ANGLE_RAD) {
+            if let Some(row) = column.iter().position(|a| a.abs() > MAX_ANGLE_RAD) {
                 let angle = column[row];
                 let reason = format!(
-                    "{name} is {angle:.1} rad; plausible angles are at most {LARGEST_ANGLE_RAD:.2} rad in either direction; check the unit"
+                    "{name} is {angle:.1} rad; plausible angles are at most {MAX_ANGLE_RAD:.2} rad in either direction; check the unit"
                 );
                 return Err(table.malformed_row(row, None, reason));
             }
@@ -245,7 +245,7 @@ impl MotionRecording {
     pub(crate) fn jump(time_s: &[f64], angle_rad: &[f64]) -> Option<(usize, f64)> {
         (1..angle_rad.len())
             .map(|row| (row, angle_rad[row] - angle_rad[row - 1]))
-            .find(|&(row, jump_rad)| jump_rad.abs() > LARGEST_SPEED_RAD_S * (time_s[row] - time_s[row - 1]))
+            .find(|&(row, jump_rad)| jump_rad.abs() > MAX_SPEED_RAD_S * (time_s[row] - time_s[row - 1]))
     }
 }
 
@@ -253,8 +253,8 @@ impl MotionRecording {
 fn still_knee(flexion_rad: &[f64]) -> Option<String> {
     let (lowest, highest) = extremes(flexion_rad);
     let range = highest - lowest;
-    (range < SMALLEST_KNEE_RANGE_RAD)
-        .then(|| format!("moves by only {range:.3} rad, less than {SMALLEST_KNEE_RANGE_RAD} rad; check the unit"))
+    (range < MIN_KNEE_RANGE_RAD)
+        .then(|| format!("moves by only {range:.3} rad, less than {MIN_KNEE_RANGE_RAD} rad; check the unit"))
 }
 
 /// The reason why an angle is not that of a walking knee: flexion is negative.

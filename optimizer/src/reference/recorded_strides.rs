@@ -6,7 +6,7 @@ use super::motion_recording::MotionRecording;
 /// Durations of valid strides, s.
 pub const STRIDE_RANGE_S: (f64, f64) = (0.8, 1.6);
 /// Longest gap between two rows of a valid stride, s.
-pub(super) const LONGEST_GAP_S: f64 = 0.1;
+pub(super) const MAX_GAP_S: f64 = 0.1;
 /// The strides between successive heel strikes, s.
 pub fn strides_between(heel_strikes_s: &[f64]) -> Vec<(f64, f64)> {
     heel_strikes_s.windows(2).map(|pair| (pair[0], pair[1])).collect()
@@ -42,6 +42,6 @@ impl MotionRecording {
     fn is_whole(&self, start: f64, end: f64) -> bool {
         self.time_s
             .windows(2)
-            .all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= LONGEST_GAP_S + ROUNDING_S)
+            .all(|pair| pair[1] <= start || pair[0] >= end || pair[1] - pair[0] <= MAX_GAP_S + ROUNDING_S)
     }
 }

@@ -3,7 +3,7 @@
 use super::heel_strikes::HeelStrikes;
 use super::motion_recording::MotionRecording;
 use super::plausibility::{unlike_builtin, why_implausible};
-use super::recorded_strides::{LONGEST_GAP_S, STRIDE_RANGE_S};
+use super::recorded_strides::{MAX_GAP_S, STRIDE_RANGE_S};
 use super::reference_gait::{MeasuredPerson, REFERENCE_ROWS, ReferenceGait};
 use crate::model_error::ModelError;
 
@@ -60,12 +60,10 @@ impl MotionRecording {
         let strikes = self.heel_strikes(how)?;
         let strides = self.strides(&strikes).into_iter().filter(|stride| stride.is_used);
         let strides: Vec<(f64, f64)> = strides.map(|stride| (stride.start_s, stride.end_s)).collect();
-        let kept =
-            format!("{} to {} s, without gaps longer than {LONGEST_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
+        let kept = format!("{} to {} s, without gaps longer than {MAX_GAP_S} s", STRIDE_RANGE_S.0, STRIDE_RANGE_S.1);
         if strides.is_empty() {
             let (shortest, longest) = STRIDE_RANGE_S;
-            let reason =
-                format!("no stride of {shortest} to {longest} s is free of gaps longer than {LONGEST_GAP_S} s");
+            let reason = format!("no stride of {shortest} to {longest} s is free of gaps longer than {MAX_GAP_S} s");
             return Err(ModelError::Malformed { what: self.what.clone(), reason });
         }
         let [mean, deviation] = self.mean_stride(&strides);

@@ -10,7 +10,7 @@ const FALISSE_2019_CSV: &str = include_str!("../../data/reference_gait_falisse_2
 /// The median of 24 healthy adults.
 const FUKUCHI_2018_CSV: &str = include_str!("../../data/reference_gait_fukuchi_2018.csv");
 /// Largest plausible joint angle, rad. Angles in degrees exceed it.
-pub const LARGEST_ANGLE_RAD: f64 = PI;
+pub const MAX_ANGLE_RAD: f64 = PI;
 /// Number of rows of a reference gait: 0, 1, ..., 100 % of the cycle.
 pub const REFERENCE_ROWS: usize = 101;
 /// The joints of the walker and their columns in Gaitwright's table. Forward lean, flexion and dorsiflexion are
@@ -102,19 +102,18 @@ impl ReferenceGait {
                 let mut row = [0.0; 5];
                 for ((value, place), wanted) in row.iter_mut().zip(places).zip(names) {
                     let cell = record.get(place).unwrap_or("");
-                    *value = cell
-                        .parse::<f64>()
-                        .ok()
-                        .filter(|angle| (least..=LARGEST_ANGLE_RAD).contains(angle))
-                        .ok_or_else(|| {
-                            let range = format!("from {least:.2} to {LARGEST_ANGLE_RAD:.2} rad");
-                            let line = record.position().map_or(0, csv::Position::line);
-                            malformed(line, format!("{wanted} is {cell:?}; it must be an angle {range}"))
-                        })?;
+                    *value =
+                        cell.parse::<f64>().ok().filter(|angle| (least..=MAX_ANGLE_RAD).contains(angle)).ok_or_else(
+                            || {
+                                let range = format!("from {least:.2} to {MAX_ANGLE_RAD:.2} rad");
+                                let line = record.position().map_or(0, csv::Position::line);
+                                malformed(line, format!("{wanted} is {cell:?}; it must be an angle {range}"))
+                            },
+                        )?;
                 }
                 Ok(row)
             };
-            angles_rad.push(cells(angles, REFERENCE_COLUMNS, -LARGEST_ANGLE_RAD)?);
+            angles_rad.push(cells(angles, REFERENCE_COLUMNS, -MAX_ANGLE_RAD)?);
             if let Some(places) = deviations {
                 deviations_rad.push(cells(places, DEVIATION_COLUMNS, 0.0)?);
             }
@@ -149,7 +148,7 @@ impl ReferenceGait {
     /// # Errors
     /// [`ModelError`] with the field.
     pub fn validate(&self) -> Result<(), ModelError> {
-        check_curves("angles_rad", &self.angles_rad, -LARGEST_ANGLE_RAD)?;
+        check_curves("angles_rad", &self.angles_rad, -MAX_ANGLE_RAD)?;
         if let Some(deviation) = &self.standard_deviation_rad {
             check_curves("standard_deviation_rad", deviation, 0.0)?;
         }
@@ -211,7 +210,7 @@ fn check_curves(field: &str, curves: &[[f64; 5]], least: f64) -> Result<(), Mode
     }
     for (row, values) in curves.iter().enumerate() {
         for (column, value) in values.iter().enumerate() {
-            ModelError::check_range(&format!("{field}[{row}][{column}]"), *value, least, LARGEST_ANGLE_RAD)?;
+            ModelError::check_range(&format!("{field}[{row}][{column}]"), *value, least, MAX_ANGLE_RAD)?;
         }
     }
     Ok(())

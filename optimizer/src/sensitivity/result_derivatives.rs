@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Largest change of a scaled variable in the differences. The results are smooth functions of the variables, except where
 /// two nodes share the peak of a joint.
-const LARGEST_CHANGE: f64 = 1e-5;
+const MAX_CHANGE: f64 = 1e-5;
 
 /// Derivatives of the results with respect to a tuned bound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -36,7 +36,7 @@ impl ResultDerivatives {
         if largest == 0.0 {
             return Self::zero();
         }
-        let step = LARGEST_CHANGE / largest;
+        let step = MAX_CHANGE / largest;
         let at = |step: f64| {
             let moved: Vec<f64> = x.iter().zip(direction).map(|(x, change)| x + step * change).collect();
             let gait = gait_of(problem, program, &moved);

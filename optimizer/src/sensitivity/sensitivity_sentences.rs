@@ -20,7 +20,7 @@ fn change_of(bound: usize, angles: DisplayAngleUnit) -> (&'static str, f64) {
     }
 }
 /// Number of places that a sentence names.
-const PLACES: usize = 3;
+const MAX_NAMED_PLACES: usize = 3;
 /// An interval without ends.
 const ANY_VALUE: &str = "any value";
 
@@ -63,7 +63,8 @@ impl BoundSensitivity {
         let (stricter, by) = if TunedBounds::IS_LOWER[place] { ("more", by) } else { ("less", -by) };
         let derivatives = &self.derivatives;
         let quantity = TunedBounds::QUANTITIES[place];
-        let mut places: Vec<&str> = self.active.iter().map(|active| active.place.as_str()).take(PLACES).collect();
+        let mut places: Vec<&str> =
+            self.active.iter().map(|active| active.place.as_str()).take(MAX_NAMED_PLACES).collect();
         let more = self.active.len().saturating_sub(places.len());
         let rest = format!("{more} more");
         if more > 0 {

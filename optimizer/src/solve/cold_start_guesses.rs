@@ -157,19 +157,19 @@ impl InitialGuess {
     ];
 
     /// Largest number of guesses of a cold start.
-    pub const MOST: usize = 64;
+    pub const MAX_GUESSES: usize = 64;
 
     /// The first `count` guesses of a cold start: the fixed ones, then perturbed ones. Without muscles only those with
     /// [`MuscleRoute::Direct`] are used, because all routes are the same.
     pub fn first(count: usize, muscles: bool) -> Vec<Self> {
         let multi_start = Self::MULTI_START.into_iter().filter(|guess| muscles || guess.route == MuscleRoute::Direct);
-        multi_start.chain((0..Self::MOST).map(Self::perturbed)).take(count).collect()
+        multi_start.chain((0..Self::MAX_GUESSES).map(Self::perturbed)).take(count).collect()
     }
 
     /// The guess with a number, from 1: the fixed ones for both variants, then perturbed ones. `None` for 0 and above
-    /// [`MOST`](Self::MOST).
+    /// [`MAX_GUESSES`](Self::MAX_GUESSES).
     pub fn numbered(number: usize) -> Option<Self> {
-        let index = number.checked_sub(1).filter(|index| *index < Self::MOST)?;
+        let index = number.checked_sub(1).filter(|index| *index < Self::MAX_GUESSES)?;
         let perturbed = || Self::perturbed(index - Self::MULTI_START.len());
         Some(Self::MULTI_START.get(index).copied().unwrap_or_else(perturbed))
     }
@@ -302,16 +302,20 @@ mod tests {
     #[test]
     fn guesses_are_valid_and_differ() {
         for muscles in [false, true] {
-            let guesses = InitialGuess::first(InitialGuess::MOST, muscles);
-            assert_eq!(guesses.len(), InitialGuess::MOST);
+            let guesses = InitialGuess::first(InitialGuess::MAX_GUESSES, muscles);
+            assert_eq!(guesses.len(), InitialGuess::MAX_GUESSES);
             for guess in &guesses {
                 guess.validate().unwrap();
             }
             let labels: HashSet<String> = guesses.iter().map(InitialGuess::label).collect();
-            assert_eq!(labels.len(), InitialGuess::MOST);
+            assert_eq!(labels.len(), InitialGuess::MAX_GUESSES);
             assert_eq!(guesses[..2], [InitialGuess::NATURAL, InitialGuess::EARLY_RISE]);
         }
-        assert!(InitialGuess::first(InitialGuess::MOST, false).iter().all(|guess| guess.route == MuscleRoute::Direct));
+        assert!(
+            InitialGuess::first(InitialGuess::MAX_GUESSES, false)
+                .iter()
+                .all(|guess| guess.route == MuscleRoute::Direct)
+        );
     }
 
     #[test]
@@ -325,7 +329,7 @@ mod tests {
         assert_eq!(InitialGuess::numbered(1), Some(InitialGuess::MULTI_START[0]));
         assert_eq!(InitialGuess::numbered(last), InitialGuess::MULTI_START.last().copied());
         assert_eq!(InitialGuess::numbered(last + 1), Some(InitialGuess::perturbed(0)));
-        assert_eq!((InitialGuess::numbered(0), InitialGuess::numbered(InitialGuess::MOST + 1)), (None, None));
+        assert_eq!((InitialGuess::numbered(0), InitialGuess::numbered(InitialGuess::MAX_GUESSES + 1)), (None, None));
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub(super) fn try_guesses(
 
 /// Number of runs at a stationary point of the violation after which no further guess is tried. With feasible
 /// bounds, so many guesses rarely end there.
-const MOST_INFEASIBLE: usize = 3;
+const MAX_INFEASIBLE: usize = 3;
 
 /// Tries the requested guesses in parallel, then further guesses until one converges.
 pub(super) fn try_multi_start(
@@ -89,7 +89,7 @@ pub(super) fn try_multi_start(
     let mut tried = try_guesses(context, first, 0, observer)?;
     for guess in others.iter().filter(|guess| context.options.retry && InitialGuess::MULTI_START.contains(guess)) {
         let infeasible = tried.iter().filter(|t| t.candidate.status == SolveStatus::Infeasible).count();
-        if tried.iter().any(FinishedRun::is_final) || infeasible >= MOST_INFEASIBLE {
+        if tried.iter().any(FinishedRun::is_final) || infeasible >= MAX_INFEASIBLE {
             break;
         }
         tried.extend(try_guesses(context, std::slice::from_ref(guess), tried.len(), observer)?);

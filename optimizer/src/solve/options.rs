@@ -20,7 +20,7 @@ pub struct SolveOptions {
     /// Number of threads, 1 to 16: for initial guesses in parallel, then for the linear algebra of each. The result
     /// does not depend on it.
     pub threads: usize,
-    /// Number of initial guesses that a cold start always tries ([`InitialGuess::first`]), 1 to [`InitialGuess::MOST`].
+    /// Number of initial guesses that a cold start always tries ([`InitialGuess::first`]), 1 to [`InitialGuess::MAX_GUESSES`].
     pub initial_guesses: usize,
     /// Whether further guesses follow until one converges.
     pub retry: bool,
@@ -60,7 +60,7 @@ impl SolveOptions {
         ModelError::check_range("tolerance", self.tolerance, 1e-10, 1e-2)?;
         ModelError::check_range("max_iterations", self.max_iterations as f64, 1.0, 1e6)?;
         ModelError::check_range("threads", self.threads as f64, 1.0, 16.0)?;
-        ModelError::check_range("initial_guesses", self.initial_guesses as f64, 1.0, InitialGuess::MOST as f64)?;
+        ModelError::check_range("initial_guesses", self.initial_guesses as f64, 1.0, InitialGuess::MAX_GUESSES as f64)?;
         self.local_optimum_choice.validate()?;
         ModelError::check_range("tightening_rounds", self.tightening_rounds as f64, 0.0, 20.0)?;
         solver_settings::validate(&self.solver)?;
@@ -103,7 +103,7 @@ impl LocalOptimumChoice {
                 ModelError::check_range("local_optimum_choice.within_percent", *within_percent, 0.0, 100.0).map(|_| ())
             }
             Self::Numbered { number } => {
-                let most = InitialGuess::MOST as f64;
+                let most = InitialGuess::MAX_GUESSES as f64;
                 ModelError::check_range("local_optimum_choice.number", *number as f64, 1.0, most).map(|_| ())
             }
         }

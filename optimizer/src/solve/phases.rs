@@ -27,7 +27,7 @@ const ROUGH: f64 = 1e-2;
 const ROUGH_VIOLATION: f64 = 1e-3;
 /// Iteration limit of a tracking phase. Usually it takes about ten. With nearly infeasible bounds it may take a
 /// thousand, and the cost phase can continue from any point.
-const MOST_TRACKING_ITERATIONS: usize = 200;
+const MAX_TRACKING_ITERATIONS: usize = 200;
 /// Violation before the projection into the bounds, as a share of the allowed violation.
 const VIOLATION_SHARE: f64 = 0.3;
 /// Initial barrier parameter of a cost phase without warm start.
@@ -97,7 +97,7 @@ impl<'a> RunInProgress<'a> {
     ) -> Result<NlpResult, SolveError> {
         let options = self.context.options;
         let most = match phase {
-            SolvePhase::Tracking | SolvePhase::MuscleTracking => MOST_TRACKING_ITERATIONS,
+            SolvePhase::Tracking | SolvePhase::MuscleTracking => MAX_TRACKING_ITERATIONS,
             SolvePhase::PlainCost | SolvePhase::Cost | SolvePhase::InterNode => usize::MAX,
         };
         let settings = NlpSettings {

@@ -16,7 +16,7 @@ pub(super) struct ChartAxis {
 }
 
 /// Fraction of the tick distance that is too small to see.
-const HAIR: f64 = 0.05;
+const INVISIBLE_TICK_SHARE: f64 = 0.05;
 
 impl ChartAxis {
     /// An axis over all values, widened to whole ticks unless `exact`; about `count` ticks.
@@ -35,7 +35,7 @@ impl ChartAxis {
         }
         let step = round_step((high - low) / count as f64);
         // A value that is barely beyond a tick does not need another tick.
-        let (first, last) = ((low / step + HAIR).floor(), (high / step - HAIR).ceil());
+        let (first, last) = ((low / step + INVISIBLE_TICK_SHARE).floor(), (high / step - INVISIBLE_TICK_SHARE).ceil());
         let (from, to) = if exact { (low, high) } else { ((first * step).min(low), (last * step).max(high)) };
         let mut ticks = Vec::new();
         let mut index = first;

@@ -79,7 +79,7 @@ const NAME_CHARACTER: f64 = 16.0;
 /// What the bars above a chart are, for its legend.
 const STANCES: &str = "bar above: stance, then swing; dotted line: foot off";
 /// Smallest value on a logarithmic axis.
-const SMALLEST: f64 = 1e-16;
+const MIN_LOG_VALUE: f64 = 1e-16;
 
 impl Chart {
     /// A chart without lines.
@@ -205,7 +205,7 @@ impl Chart {
 
     /// Position of a value on the y axis.
     fn height(&self, value: f64) -> f64 {
-        if self.log_y { value.max(SMALLEST).log10() } else { value }
+        if self.log_y { value.max(MIN_LOG_VALUE).log10() } else { value }
     }
 
     /// Class and label of each visible line and other mark, for a legend in HTML.

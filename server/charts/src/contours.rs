@@ -11,9 +11,9 @@ pub(super) struct Contour {
 }
 
 /// At most this many lines, so that each can be told from the next.
-const MOST_LEVELS: usize = 5;
+const MAX_LEVELS: usize = 5;
 /// Levels are multiples of it, because cells show two decimals.
-const LEAST_STEP: f64 = 0.01;
+const MIN_STEP: f64 = 0.01;
 
 /// Contour lines of a grid at three to five round levels, fewer if the values hardly differ.
 pub(super) fn contours(grid: &[Vec<f64>]) -> Vec<Contour> {
@@ -25,7 +25,7 @@ pub(super) fn contours(grid: &[Vec<f64>]) -> Vec<Contour> {
 
 /// Multiples of the smallest round step that gives few enough of them between two values.
 fn round_levels((low, high): (f64, f64)) -> Vec<f64> {
-    if !(high - low).is_finite() || high - low < LEAST_STEP {
+    if !(high - low).is_finite() || high - low < MIN_STEP {
         return Vec::new();
     }
     let power = 10_f64.powf(((high - low) / 10.0).log10().floor());
@@ -36,11 +36,11 @@ fn round_levels((low, high): (f64, f64)) -> Vec<f64> {
         levels.filter(|level| *level > low && *level < high).collect::<Vec<_>>()
     };
     let is_shown = |step: &f64| {
-        let hundredths = step / LEAST_STEP;
+        let hundredths = step / MIN_STEP;
         hundredths > 0.5 && (hundredths - hundredths.round()).abs() < 1e-6
     };
     let fitting = steps.into_iter().filter(is_shown).map(between);
-    fitting.into_iter().find(|levels| levels.len() <= MOST_LEVELS).unwrap_or_default()
+    fitting.into_iter().find(|levels| levels.len() <= MAX_LEVELS).unwrap_or_default()
 }
 
 /// The pieces of one level.
@@ -144,7 +144,7 @@ mod tests {
         for i in 1..2000 {
             let range = (-0.37 * f64::from(i).sin(), f64::from(i) * 0.013);
             let levels = round_levels(range).len();
-            assert!(levels <= MOST_LEVELS && (range.1 - range.0 < 0.13 || levels >= 2), "{range:?}: {levels}");
+            assert!(levels <= MAX_LEVELS && (range.1 - range.0 < 0.13 || levels >= 2), "{range:?}: {levels}");
         }
     }
 

@@ -8,7 +8,7 @@ use thiserror::Error;
 /// Pixels of a PNG per unit of the drawing, which gives 1280 for a chart.
 const SCALE: f32 = 2.0;
 /// Maximum number of pixels of a PNG. Large drawings get a smaller scale.
-const MOST_PIXELS: f32 = 1.2e7;
+const MAX_PIXELS: f32 = 1.2e7;
 
 /// Why a PNG cannot be made.
 #[derive(Debug, Error)]
@@ -30,7 +30,7 @@ impl Figure {
         let mut options = resvg::usvg::Options { font_family: "DejaVu Sans".to_owned(), ..Default::default() };
         options.fontdb_mut().load_font_source(Source::Binary(Arc::new(dejavu::sans::regular())));
         let tree = resvg::usvg::Tree::from_str(&self.svg(), &options)?;
-        let scale = SCALE.min((MOST_PIXELS / (tree.size().width() * tree.size().height())).sqrt());
+        let scale = SCALE.min((MAX_PIXELS / (tree.size().width() * tree.size().height())).sqrt());
         let size = tree.size().to_int_size().scale_by(scale);
         let size = size.ok_or_else(|| PngError::Pixels("it has no size".to_owned()))?;
         let pixels = resvg::tiny_skia::Pixmap::new(size.width(), size.height());
@@ -64,7 +64,7 @@ mod tests {
         let figure = Figure::tree(Tree { title: "Warm starts".to_owned(), nodes: (0..400).map(node).collect() });
         let pixels = resvg::tiny_skia::Pixmap::decode_png(&figure.png().unwrap()).unwrap();
         let count = (pixels.width() * pixels.height()) as f32;
-        assert!(count > 1e5 && count <= MOST_PIXELS * 1.01, "{count}");
+        assert!(count > 1e5 && count <= MAX_PIXELS * 1.01, "{count}");
     }
 
     #[test]

@@ -72,7 +72,7 @@ impl PointLink {
 
 impl Stroke {
     /// Dash patterns that distinguish lines without colours. They repeat after five.
-    pub const APART: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
+    pub const DISTINCT: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
 
     pub(super) fn class(self) -> &'static str {
         match self {
@@ -118,7 +118,7 @@ impl Series {
             for run in self.points.split(|point| !seen(point)) {
                 let mut places: Vec<(f64, f64)> = run.iter().map(|&(x, y)| (px(x), py(y))).collect();
                 let steps = matches!(self.stroke, Stroke::Steps | Stroke::DashedSteps);
-                if Stroke::APART.contains(&self.stroke) {
+                if Stroke::DISTINCT.contains(&self.stroke) {
                     places = simplified(&places);
                 }
                 let last = places.len().saturating_sub(1);
@@ -135,7 +135,7 @@ impl Series {
             }
             write!(svg, "\"/>")?;
         }
-        if !Stroke::APART.contains(&self.stroke) {
+        if !Stroke::DISTINCT.contains(&self.stroke) {
             let links = self.links.iter().map(Some).chain(std::iter::repeat(None));
             let drawn = self.points.iter().zip(links).filter(|((x, y), _)| x.is_finite() && y.is_finite());
             for (&(x, y), link) in drawn {

@@ -8,7 +8,7 @@ pub const COMPUTING: i32 = 5;
 /// Threads that solve; they yield to everything that a caller waits for.
 pub const SOLVER: i32 = 10;
 /// Threads that certify and explain; they yield to solves, too.
-pub const AFTERWARDS: i32 = 19;
+pub const BACKGROUND_NICENESS: i32 = 19;
 /// Stack size of solver threads. Block factorisations recurse deeper than the default allows.
 pub const STACK_BYTES: usize = 16 << 20;
 
@@ -30,7 +30,7 @@ pub fn run_below_solves<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> io::Result<oneshot::Receiver<T>> {
-    run_with(AFTERWARDS, name, work)
+    run_with(BACKGROUND_NICENESS, name, work)
 }
 
 /// Runs work on its own thread with this priority. A panic drops the sender. Dropping the receiver abandons the thread.

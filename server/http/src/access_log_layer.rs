@@ -68,9 +68,9 @@ const EXPORTS_BY_POST: [&str; 2] = ["/system/backup", "/api/v1/backups"];
 const SECRETS: [&str; 2] = ["{code}", "{link}"];
 
 /// Longest time until a row is written.
-const WITHIN: Duration = Duration::from_secs(1);
+const MAX_WRITE_DELAY: Duration = Duration::from_secs(1);
 /// Maximum length of a logged address.
-const LONGEST_OBJECT: usize = 300;
+const MAX_OBJECT: usize = 300;
 
 /// The trials of a response that must not be sent after any of their gaits was reported as unsafe. An extension of the
 /// response.
@@ -99,7 +99,7 @@ async fn keep_writing(app: AppState) {
 async fn write_pending_rows(app: AppState, task: Task) -> Result<(), Error> {
     let mut failing = false;
     loop {
-        tokio::time::sleep(WITHIN).await;
+        tokio::time::sleep(MAX_WRITE_DELAY).await;
         match app.access.log.write(app.store(), false).await {
             Ok(()) => {
                 task.works();
@@ -228,7 +228,7 @@ fn object(route: &str, path: &str, query: Option<&str>) -> String {
         return route.to_owned();
     }
     let whole = query.map_or_else(|| path.to_owned(), |query| format!("{path}?{query}"));
-    whole.chars().filter(|c| !c.is_control()).take(LONGEST_OBJECT).collect()
+    whole.chars().filter(|c| !c.is_control()).take(MAX_OBJECT).collect()
 }
 
 /// What a path parameter names: the identifiers in it as they stand in the record, or else the text itself, such as a token.

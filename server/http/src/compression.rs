@@ -5,7 +5,7 @@ use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{And, Predicate, SizeAbove};
 
 /// Smallest body that is compressed, bytes: a smaller one fits into one packet anyway.
-const SMALLEST: u64 = 1024;
+const MIN_COMPRESSED_BYTES: u64 = 1024;
 
 type IsCompressible = fn(StatusCode, Version, &HeaderMap, &Extensions) -> bool;
 
@@ -22,5 +22,5 @@ fn is_compressible(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extension
 /// The layer.
 pub(super) fn layer() -> CompressionLayer<And<SizeAbove, IsCompressible>> {
     let is_compressible: IsCompressible = is_compressible;
-    CompressionLayer::new().compress_when(SizeAbove::new(SMALLEST).and(is_compressible))
+    CompressionLayer::new().compress_when(SizeAbove::new(MIN_COMPRESSED_BYTES).and(is_compressible))
 }

@@ -22,11 +22,11 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 
 /// Idle time after which a connection can be replaced.
-const QUIET: Duration = Duration::from_millis(250);
+const MIN_IDLE_TIME: Duration = Duration::from_millis(250);
 /// Interval of the search for an idle connection while the service is full.
-const LOOK: Duration = Duration::from_millis(50);
+const IDLE_SEARCH_INTERVAL: Duration = Duration::from_millis(50);
 /// Least time between two log lines about a limit.
-const SAY_EVERY: Duration = Duration::from_secs(10);
+const LOG_INTERVAL: Duration = Duration::from_secs(10);
 /// File descriptors reserved for the record, backups and files.
 const RESERVED: u64 = 128;
 /// File descriptors that the process requests.
@@ -196,7 +196,8 @@ impl Connections {
         if table.count(Some(network)) < self.limits.per_address {
             return true;
         }
-        let made = self.close_quietest(&mut table, QUIET, |connection| connection.network.as_deref() == Some(network));
+        let made =
+            self.close_quietest(&mut table, MIN_IDLE_TIME, |connection| connection.network.as_deref() == Some(network));
         table.untold.1 += u64::from(!made);
         self.tell(&mut table);
         made
@@ -211,7 +212,8 @@ impl Connections {
             if !self.close_one_for(network) {
                 return None;
             }
-            if let Ok(permit) = tokio::time::timeout(LOOK, Arc::clone(&self.room).acquire_owned()).await {
+            if let Ok(permit) = tokio::time::timeout(IDLE_SEARCH_INTERVAL, Arc::clone(&self.room).acquire_owned()).await
+            {
                 return permit.ok();
             }
         }
@@ -221,7 +223,7 @@ impl Connections {
     /// new connection will. Returns whether the new connection can wait for room.
     fn close_one_for(&self, network: Option<&str>) -> bool {
         let mut table = self.table();
-        let mut closed = self.close_quietest(&mut table, QUIET, |_| true);
+        let mut closed = self.close_quietest(&mut table, MIN_IDLE_TIME, |_| true);
         if !closed && let Some(largest) = table.largest_beyond(network) {
             let of_largest = |connection: &ClientConnection| connection.network.as_ref() == Some(&largest);
             closed = self.close_quietest(&mut table, Duration::ZERO, of_largest);
@@ -258,7 +260,7 @@ impl Connections {
 
     fn tell(&self, table: &mut ConnectionTable) {
         let (closed, refused) = table.untold;
-        if (closed, refused) == (0, 0) || table.told_at.is_some_and(|at| at.elapsed() < SAY_EVERY) {
+        if (closed, refused) == (0, 0) || table.told_at.is_some_and(|at| at.elapsed() < LOG_INTERVAL) {
             return;
         }
         let ConnectionLimits { total, per_address } = self.limits;

@@ -4,7 +4,7 @@
 //! parameters, the Idempotency-Key of every change whose response contains no secret, rules of values, and security
 //! schemes.
 
-use super::paging::{DEFAULT_LIMIT, LARGEST_LIMIT};
+use super::paging::{DEFAULT_LIMIT, MAX_LIMIT};
 use super::problem_details::{PROBLEM_JSON, Problem};
 use super::{api, openapi_dependent_rules, openapi_nulls, openapi_rules, saved_as};
 use serde_json::{Map, Value, json};
@@ -147,14 +147,14 @@ fn complete(operation: &mut Value, method: &str, schemas: &Value) {
         }));
         parameters.push(json!({
             "name": "limit", "in": "query", "required": false,
-            "schema": { "type": "integer", "format": "int32", "minimum": 1, "maximum": LARGEST_LIMIT, "default": DEFAULT_LIMIT },
+            "schema": { "type": "integer", "format": "int32", "minimum": 1, "maximum": MAX_LIMIT, "default": DEFAULT_LIMIT },
             "description": "Maximum number of entries on the page"
         }));
     }
     if !changes && operation.pointer("/responses/200/content/application~1json").is_some() {
         parameters.push(json!({
             "name": saved_as::PARAMETER, "in": "query", "required": false,
-            "schema": { "type": "string", "pattern": saved_as::PATTERN, "maxLength": saved_as::LONGEST },
+            "schema": { "type": "string", "pattern": saved_as::PATTERN, "maxLength": saved_as::MAX_LENGTH },
             "description": "Name of the file, such as `trial.json`, as which a browser saves the response"
         }));
     }

@@ -17,8 +17,8 @@ use gait_optimizer::settings::Naturalness;
 use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
 use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::overlaid_gaits::MOST_OTHERS;
-use gaitwright_service::studies::seed::LARGEST_SEED;
+use gaitwright_service::studies::overlaid_gaits::MAX_OTHERS;
+use gaitwright_service::studies::seed::MAX_SEED;
 use gaitwright_store::trial_list::SORTS;
 use serde_json::{Map, Value, json};
 
@@ -136,10 +136,10 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
             schemas.add("NewReferenceGait", field, &json!({ "minimum": least, "maximum": most }));
         }
         for component in ["NewStudy", "StudyClone"] {
-            schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
+            schemas.add(component, "seed", &json!({ "minimum": 0, "maximum": MAX_SEED }));
             schemas.add(component, "number_of_trials", &json!({ "minimum": 1, "maximum": 10_000 }));
         }
-        schemas.add("NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": LARGEST_SEED }));
+        schemas.add("NewExecutionReport", "seed", &json!({ "minimum": 0, "maximum": MAX_SEED }));
         schemas.add("NewStudy", "parallel_trials", &json!({ "minimum": 1, "maximum": 64 }));
         schemas.add("NewStudy", "priority", &json!({ "minimum": -10, "maximum": 10 }));
         schemas.add("NewStudy", "solve_seconds_budget", &json!({ "minimum": 1, "maximum": 1e8 }));
@@ -369,7 +369,7 @@ fn state_parameter(parameter: &mut Value) {
         "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => identifiers(2, 20),
         // A study is compared with one other study, whose identifier is a schema.
-        "other" if parameter["schema"].get("$ref").is_none() => identifiers(1, MOST_OTHERS),
+        "other" if parameter["schema"].get("$ref").is_none() => identifiers(1, MAX_OTHERS),
         "x" | "y" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };

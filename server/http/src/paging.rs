@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 /// Entries on a page when the request does not say how many.
 pub(super) const DEFAULT_LIMIT: u32 = 200;
 /// Most entries on a page.
-pub(super) const LARGEST_LIMIT: u32 = 1000;
+pub(super) const MAX_LIMIT: u32 = 1000;
 
 /// A page of a list.
 #[derive(Debug, Serialize, ToSchema)]
@@ -50,7 +50,7 @@ pub(crate) struct SearchText(String);
 
 impl SearchText {
     /// Maximum length in characters.
-    const LONGEST: usize = 200;
+    const MAX_LENGTH: usize = 200;
 
     pub(crate) fn as_str(&self) -> &str {
         self.0.trim()
@@ -62,7 +62,7 @@ impl TryFrom<String> for SearchText {
 
     fn try_from(text: String) -> Result<Self, String> {
         match text.chars().count() {
-            length if length > Self::LONGEST => Err(format!("at most {} characters long", Self::LONGEST)),
+            length if length > Self::MAX_LENGTH => Err(format!("at most {} characters long", Self::MAX_LENGTH)),
             _ => Ok(Self(text)),
         }
     }
@@ -174,8 +174,8 @@ impl<K: DeserializeOwned, F: DeserializeOwned> Paging<K, F> {
 }
 
 fn read_limit(text: &str) -> Result<u32, Error> {
-    let refused = || Error::invalid("limit", text, &format!("1 to {LARGEST_LIMIT}"));
-    text.parse().ok().filter(|limit| (1..=LARGEST_LIMIT).contains(limit)).ok_or_else(refused)
+    let refused = || Error::invalid("limit", text, &format!("1 to {MAX_LIMIT}"));
+    text.parse().ok().filter(|limit| (1..=MAX_LIMIT).contains(limit)).ok_or_else(refused)
 }
 
 impl<K: DeserializeOwned, F: DeserializeOwned> FromRequestParts<AppState> for Paging<K, F> {

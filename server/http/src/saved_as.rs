@@ -15,7 +15,7 @@ pub(super) const PARAMETER: &str = "download";
 /// The names that it accepts, as a pattern.
 pub(super) const PATTERN: &str = r"^[\p{L}\p{N}][\p{L}\p{N}._-]*\.json$";
 /// Maximum length of a name, characters.
-pub(super) const LONGEST: usize = 200;
+pub(super) const MAX_LENGTH: usize = 200;
 
 /// Marks a request whose response is saved under a name.
 #[derive(Debug, Clone, Copy)]
@@ -50,7 +50,7 @@ fn taken_from(uri: &Uri) -> Result<Option<(String, Uri)>, Error> {
     };
     if !is_allowed(&name) {
         let allowed =
-            format!("the name of a .json file: at most {LONGEST} letters, digits, dots, hyphens and underscores");
+            format!("the name of a .json file: at most {MAX_LENGTH} letters, digits, dots, hyphens and underscores");
         return Err(Error::invalid(PARAMETER, name, &allowed));
     }
     let path = uri.path();
@@ -62,7 +62,7 @@ fn taken_from(uri: &Uri) -> Result<Option<(String, Uri)>, Error> {
 fn is_allowed(name: &str) -> bool {
     let known = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.' | '_');
     let stem = name.strip_suffix(".json").unwrap_or_default();
-    stem.starts_with(char::is_alphanumeric) && stem.chars().all(known) && name.chars().count() <= LONGEST
+    stem.starts_with(char::is_alphanumeric) && stem.chars().all(known) && name.chars().count() <= MAX_LENGTH
 }
 
 #[cfg(test)]
@@ -87,6 +87,6 @@ mod tests {
         {
             assert!(taken(&format!("?download{refused}")).is_err(), "{refused}");
         }
-        assert!(taken(&format!("?download={}.json", "a".repeat(LONGEST))).is_err());
+        assert!(taken(&format!("?download={}.json", "a".repeat(MAX_LENGTH))).is_err());
     }
 }

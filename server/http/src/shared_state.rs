@@ -44,7 +44,7 @@ pub struct AppState {
 }
 
 /// Default time limit of a response.
-const SLOWEST_ANSWER: Duration = Duration::from_mins(1);
+const MAX_ANSWER_TIME: Duration = Duration::from_mins(1);
 
 /// Sign-in and sessions.
 #[derive(Debug)]
@@ -89,7 +89,7 @@ impl AppState {
         let analyses = Arc::clone(scheduler.analyses());
         let store = scheduler.store().with_own_pool();
         let (requests, proxies) = (Arc::default(), Proxies::default());
-        Self { scheduler, access, requests, analyses, hosts, proxies, slowest_answer: SLOWEST_ANSWER, backups, store }
+        Self { scheduler, access, requests, analyses, hosts, proxies, slowest_answer: MAX_ANSWER_TIME, backups, store }
     }
 
     /// The runners of jobs.

@@ -23,11 +23,11 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 /// Interval of checks while there are no events.
-const ASKS_EVERY: Duration = Duration::from_secs(1);
+const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for which a check is valid.
-const HOLDS_FOR: Duration = Duration::from_millis(100);
+const CHECK_VALIDITY: Duration = Duration::from_millis(100);
 /// Length of the queue for a slow listener.
-const AHEAD: usize = 16;
+const QUEUE_LENGTH: usize = 16;
 /// Interval of keep-alive comments, because proxies close silent connections.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
@@ -62,7 +62,7 @@ impl<P: RequiredRight> StudyListener<P> {
     where
         F: Future<Output = Result<(), ListenerGone>> + Send + 'static,
     {
-        let (events, receiver) = mpsc::channel(AHEAD);
+        let (events, receiver) = mpsc::channel(QUEUE_LENGTH);
         let sender = Sender { listening: self.copy(), events, asked: None };
         let produced = produce(sender);
         let stopping = self.app.scheduler.stopping();
@@ -86,7 +86,7 @@ impl<P: RequiredRight> StudyListener<P> {
         let mut pulse = self.app.scheduler.pulse();
         loop {
             // Wakes on a change of the record, or after the interval, because sessions expire without a change.
-            let _ = tokio::time::timeout(ASKS_EVERY, pulse.changed()).await;
+            let _ = tokio::time::timeout(CHECK_INTERVAL, pulse.changed()).await;
             if !self.may_listen().await {
                 return;
             }
@@ -117,7 +117,7 @@ pub(crate) struct Sender<P> {
 impl<P: RequiredRight> Sender<P> {
     /// Sends an event.
     pub(crate) async fn send(&mut self, event: Event) -> Result<(), ListenerGone> {
-        if self.asked.is_none_or(|asked| asked.elapsed() > HOLDS_FOR) {
+        if self.asked.is_none_or(|asked| asked.elapsed() > CHECK_VALIDITY) {
             if !self.listening.may_listen().await {
                 return Err(ListenerGone);
             }

@@ -13,7 +13,7 @@ use std::convert::Infallible;
 
 const COOKIE: &str = "gaitwright_units";
 /// How long a browser keeps the preference: a year, s.
-const KEPT_S: u32 = 365 * 24 * 3600;
+const COOKIE_LIFETIME_S: u32 = 365 * 24 * 3600;
 
 /// Units of heights and body masses.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -36,7 +36,7 @@ impl Units {
 
     /// The Set-Cookie header that keeps the preference. It identifies nobody.
     pub(crate) fn cookie(self) -> Result<HeaderValue, Error> {
-        let text = format!("{COOKIE}={}; Path=/; HttpOnly; SameSite=Lax; Max-Age={KEPT_S}", self.as_str());
+        let text = format!("{COOKIE}={}; Path=/; HttpOnly; SameSite=Lax; Max-Age={COOKIE_LIFETIME_S}", self.as_str());
         HeaderValue::from_str(&text).map_err(|error| Error::Internal(error.to_string()))
     }
 }

@@ -8,11 +8,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Time within which repeated requests share a row.
-const REPEATED_WITHIN: Duration = Duration::from_mins(1);
+const REPEAT_WINDOW: Duration = Duration::from_mins(1);
 /// Number of rows per transaction, so that others do not wait long for the writer.
-const AT_ONCE: usize = 50;
+const ROWS_PER_TRANSACTION: usize = 50;
 /// Number of unwritten rows beyond which refusals of unknown callers share a row.
-const MOST_WAITING: usize = 1000;
+const MAX_WAITING: usize = 1000;
 
 /// The rows that are not written yet.
 #[derive(Debug, Default)]
@@ -36,7 +36,7 @@ impl AccessLog {
     /// Counts an access. Returns whether the writing task must be started.
     pub(crate) fn count(&self, mut access: Access) -> bool {
         let mut waiting = self.waiting();
-        if waiting.rows.len() >= MOST_WAITING
+        if waiting.rows.len() >= MAX_WAITING
             && access.kind == AccessKind::Refused
             && !waiting.rows.contains_key(&access)
         {
@@ -54,7 +54,7 @@ impl AccessLog {
     fn due(&self, all: bool) -> Vec<(Access, Tally)> {
         let mut waiting = self.waiting();
         let UnwrittenRows { rows, written, .. } = &mut *waiting;
-        written.retain(|_, at| at.elapsed() < REPEATED_WITHIN);
+        written.retain(|_, at| at.elapsed() < REPEAT_WINDOW);
         let mut due: Vec<_> = rows.extract_if(|access, _| all || !written.contains_key(access)).collect();
         due.sort_by_key(|(_, tally)| tally.first_at);
         written.extend(due.iter().map(|(access, _)| (access.clone(), Instant::now())));
@@ -78,7 +78,7 @@ impl AccessLog {
     pub async fn write(&self, store: &Store, all: bool) -> Result<(), Error> {
         let mut unwritten = Unwritten { log: self, rows: self.due(all) };
         while !unwritten.rows.is_empty() {
-            let count = unwritten.rows.len().min(AT_ONCE);
+            let count = unwritten.rows.len().min(ROWS_PER_TRANSACTION);
             append(store, &unwritten.rows[..count]).await?;
             unwritten.rows.drain(..count);
         }

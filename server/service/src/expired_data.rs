@@ -11,7 +11,7 @@ pub const IDEMPOTENCY_KEY_DAYS: i64 = 7;
 /// Days after which ended or idle sessions, and used or expired links, are deleted. The audit trail keeps the sign-ins.
 pub const SESSION_DAYS: i64 = 90;
 /// Time between two rounds.
-const EVERY: Duration = Duration::from_hours(1);
+const CLEANUP_INTERVAL: Duration = Duration::from_hours(1);
 const DAY_S: i64 = 86_400;
 
 /// How much a round deleted.
@@ -56,6 +56,6 @@ pub async fn delete_expired_hourly(store: Store, task: Task) -> Result<(), Error
             }
             Err(error) => tracing::warn!(%error, "cannot delete expired data"),
         }
-        tokio::time::sleep(EVERY).await;
+        tokio::time::sleep(CLEANUP_INTERVAL).await;
     }
 }

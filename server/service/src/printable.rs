@@ -6,7 +6,7 @@ use icu_properties::{CodePointMapData, CodePointSetData};
 use unicode_normalization::UnicodeNormalization;
 
 /// Characters that change the direction of text, so that one name can look like another.
-const TURNING: [char; 12] = [
+const DIRECTION_CHANGES: [char; 12] = [
     '\u{061c}', '\u{200e}', '\u{200f}', '\u{202a}', '\u{202b}', '\u{202c}', '\u{202d}', '\u{202e}', '\u{2066}',
     '\u{2067}', '\u{2068}', '\u{2069}',
 ];
@@ -26,7 +26,7 @@ fn prints(c: char) -> bool {
             | Category::PrivateUse
             | Category::Unassigned
     );
-    has_look && !TURNING.contains(&c) && !BLANK.contains(&c)
+    has_look && !DIRECTION_CHANGES.contains(&c) && !BLANK.contains(&c)
 }
 
 /// The name, trimmed.
@@ -52,7 +52,7 @@ pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error>
         return Err(FieldError::described(field, &format!("{length} characters long"), &allowed).into());
     }
     let parts = |c: char| matches!(c, '\n' | '\r' | '\t');
-    match text.chars().find(|&c| (c.is_control() && !parts(c)) || TURNING.contains(&c)) {
+    match text.chars().find(|&c| (c.is_control() && !parts(c)) || DIRECTION_CHANGES.contains(&c)) {
         Some(c) => {
             let is = format!("text with the character {}", c.escape_unicode());
             Err(FieldError::described(field, &is, "text with printable characters and line breaks only").into())
@@ -66,12 +66,12 @@ pub(crate) fn note(field: &str, text: &str, longest: usize) -> Result<(), Error>
 /// # Errors
 /// As [`note`].
 pub(crate) fn reason<'a>(field: &str, text: &'a str, what: &str) -> Result<&'a str, Error> {
-    const LONGEST: usize = 2000;
+    const MAX_LENGTH: usize = 2000;
     let text = text.trim();
     if text.is_empty() {
-        return Err(Error::invalid(field, text, &format!("1 to {LONGEST} characters long{what}")));
+        return Err(Error::invalid(field, text, &format!("1 to {MAX_LENGTH} characters long{what}")));
     }
-    note(field, text, LONGEST)?;
+    note(field, text, MAX_LENGTH)?;
     Ok(text)
 }
 

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
 /// Delay after a failed backup.
-const RETRY: Duration = Duration::from_mins(10);
+const RETRY_PAUSE: Duration = Duration::from_mins(10);
 
 /// Folder and interval of backups, and how many to keep.
 #[derive(Debug, Clone)]
@@ -92,7 +92,7 @@ impl ClaimedPlan {
     fn failed(&self, error: &Error) -> Duration {
         tracing::error!(folder = %self.backups.folder().path().display(), %error, "the record was not backed up; retrying in ten minutes");
         self.backups.failed(error.to_string());
-        RETRY
+        RETRY_PAUSE
     }
 }
 

@@ -12,11 +12,11 @@ use tokio_util::task::AbortOnDropHandle;
 /// Pause before the first restart. It doubles with each failure that follows soon.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest of these pauses.
-const LONGEST_PAUSE: Duration = Duration::from_secs(10);
-/// Number of failures within [`RECENTLY`] from which a running task is reported too.
-const OFTEN: usize = 5;
-/// The time window of [`OFTEN`].
-const RECENTLY: Duration = Duration::from_mins(1);
+const MAX_PAUSE: Duration = Duration::from_secs(10);
+/// Number of failures within [`FAILURE_WINDOW`] from which a running task is reported too.
+const FAILURE_LIMIT: usize = 5;
+/// The time window of [`FAILURE_LIMIT`].
+const FAILURE_WINDOW: Duration = Duration::from_mins(1);
 
 /// The states of the background tasks.
 #[derive(Debug, Clone, Default)]
@@ -64,23 +64,23 @@ impl Tasks {
             };
             tracing::error!(task = name, reason, "a background task failed; restarting it");
             self.failed(name, reason);
-            if begun.elapsed() > RECENTLY {
+            if begun.elapsed() > FAILURE_WINDOW {
                 pause = FIRST_PAUSE;
             }
             if stop.run_until_cancelled(tokio::time::sleep(pause)).await.is_none() {
                 return;
             }
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            pause = (pause * 2).min(MAX_PAUSE);
         }
     }
 
     /// Which task is down or fails often, and why; `None` if all work.
     pub fn problem(&self) -> Option<String> {
         self.all().iter().find_map(|(name, state)| {
-            let recent = state.failures.iter().filter(|at| at.elapsed() < RECENTLY).count();
+            let recent = state.failures.iter().filter(|at| at.elapsed() < FAILURE_WINDOW).count();
             match &state.down {
                 Some(reason) => Some(format!("The task {name:?} is down: {}.", reason.trim_end_matches('.'))),
-                None if recent >= OFTEN => {
+                None if recent >= FAILURE_LIMIT => {
                     let reason = state.reason.trim_end_matches('.');
                     Some(format!("The task {name:?} failed {recent} times within a minute. The last reason: {reason}."))
                 }
@@ -93,7 +93,7 @@ impl Tasks {
         let mut all = self.all();
         let state = all.entry(name).or_default();
         state.failures.push_back(Instant::now());
-        if state.failures.len() > OFTEN {
+        if state.failures.len() > FAILURE_LIMIT {
             state.failures.pop_front();
         }
         state.reason.clone_from(&reason);
@@ -163,7 +163,7 @@ mod tests {
     #[tokio::test]
     async fn repeatedly_failing_task_is_reported_while_it_runs() {
         let (tasks, task) = (Tasks::default(), "planning");
-        for _ in 0..OFTEN {
+        for _ in 0..FAILURE_LIMIT {
             tasks.failed(task, "refused".to_owned());
             Task { name: task, tasks: tasks.clone() }.works();
         }

@@ -31,9 +31,9 @@ pub(super) struct DoctorCommand {
 }
 
 /// How long a running service may take to answer.
-const HEALTH_WITHIN: Duration = Duration::from_secs(2);
+const HEALTH_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest answer that is read, bytes.
-const LONGEST_HEALTH: u64 = 4096;
+const MAX_HEALTH_BYTES: u64 = 4096;
 
 const VALID_SETTINGS: &str = "needs valid settings";
 
@@ -219,11 +219,11 @@ fn answers(plan: &Result<ServicePlan, Error>) -> bool {
         to.set_ip(if to.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
     }
     let health = || -> std::io::Result<String> {
-        let mut stream = TcpStream::connect_timeout(&to, HEALTH_WITHIN)?;
-        stream.set_read_timeout(Some(HEALTH_WITHIN))?;
+        let mut stream = TcpStream::connect_timeout(&to, HEALTH_TIMEOUT)?;
+        stream.set_read_timeout(Some(HEALTH_TIMEOUT))?;
         stream.write_all(format!("GET /health HTTP/1.1\r\nhost: {to}\r\nconnection: close\r\n\r\n").as_bytes())?;
         let mut answer = String::new();
-        stream.take(LONGEST_HEALTH).read_to_string(&mut answer)?;
+        stream.take(MAX_HEALTH_BYTES).read_to_string(&mut answer)?;
         Ok(answer)
     };
     plan.tls.is_some()

@@ -1,14 +1,14 @@
 //! Parsers of numbers on the command line. Errors name the allowed range.
 
-use gaitwright_service::studies::seed::LARGEST_SEED;
+use gaitwright_service::studies::seed::MAX_SEED;
 use std::fmt::Display;
 use std::str::FromStr;
 
 /// Maximum number of parallel solves.
-const MOST_WORKERS: usize = 64;
+const MAX_WORKERS: usize = 64;
 
 pub(super) fn workers(text: &str) -> Result<usize, String> {
-    whole(text, 1, MOST_WORKERS)
+    whole(text, 1, MAX_WORKERS)
 }
 
 pub(super) fn trials(text: &str) -> Result<u32, String> {
@@ -16,7 +16,7 @@ pub(super) fn trials(text: &str) -> Result<u32, String> {
 }
 
 pub(super) fn seed(text: &str) -> Result<u64, String> {
-    whole(text, 0, LARGEST_SEED)
+    whole(text, 0, MAX_SEED)
 }
 
 pub(super) fn iterations(text: &str) -> Result<usize, String> {

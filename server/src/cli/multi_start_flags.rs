@@ -6,7 +6,7 @@ use gait_optimizer::{InitialGuess, LocalOptimumChoice, ModelError, SolveOptions}
 use gaitwright_service::error::Error;
 
 fn initial_guesses(text: &str) -> Result<usize, String> {
-    whole(text, 1, InitialGuess::MOST)
+    whole(text, 1, InitialGuess::MAX_GUESSES)
 }
 
 #[derive(Debug, Clone, Args)]

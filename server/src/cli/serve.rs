@@ -31,7 +31,7 @@ use std::time::Duration;
 /// Time for running requests to finish when the service stops.
 const DRAIN: Duration = Duration::from_secs(20);
 /// Time after which a connection without a complete request head is closed.
-const SILENCE: Duration = Duration::from_secs(15);
+const REQUEST_HEAD_TIMEOUT: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Args)]
 pub(super) struct ServeCommand {
@@ -155,7 +155,7 @@ impl ServeCommand {
 
 /// Closes connections that send no request.
 fn cut_off_silence(http: &mut Builder<TokioExecutor>) {
-    http.http1().timer(TokioTimer::new()).header_read_timeout(SILENCE);
+    http.http1().timer(TokioTimer::new()).header_read_timeout(REQUEST_HEAD_TIMEOUT);
 }
 
 /// Runs the housekeeping tasks until the scheduler stops: deletes expired data and makes backups. Failures are logged

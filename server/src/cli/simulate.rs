@@ -31,12 +31,12 @@ pub(super) struct SimulateCommand {
 }
 
 fn simulated_walks(text: &str) -> Result<u32, String> {
-    whole(text, 1, ExecutionOptions::MOST_SIMULATED_WALKS)
+    whole(text, 1, ExecutionOptions::MAX_SIMULATED_WALKS)
 }
 
 /// A height in millimetres, because the error of the library names its own field, in metres.
 fn ground(text: &str) -> Result<f64, String> {
-    let most = 1000.0 * ExecutionOptions::HIGHEST_GROUND_M;
+    let most = 1000.0 * ExecutionOptions::MAX_GROUND_M;
     match number(text) {
         Ok(millimetres) if (0.0..=most).contains(&millimetres) => Ok(millimetres),
         _ => Err(format!("must be a number from 0 to {most}")),

@@ -3,12 +3,12 @@
 use super::flag_choices::{SIMULATED_WALKS, one_of};
 use super::flag_numbers::{number, whole};
 use clap::Args;
-use gaitwright_service::studies::execution::MOST_SIMULATED_WALKS;
+use gaitwright_service::studies::execution::MAX_SIMULATED_WALKS;
 use gaitwright_service::studies::simulated_walks_setting::SimulatedWalksSetting;
 use gaitwright_store::studies::SimulatedWalksEffect;
 
 fn simulated_walks(text: &str) -> Result<u32, String> {
-    whole(text, 1, MOST_SIMULATED_WALKS)
+    whole(text, 1, MAX_SIMULATED_WALKS)
 }
 
 #[derive(Debug, Clone, Args)]

@@ -30,7 +30,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of threads of a solve.
-const MOST_THREADS: usize = 16;
+const MAX_THREADS: usize = 16;
 
 #[derive(Debug, Args)]
 pub(super) struct SolveCommand {
@@ -115,7 +115,7 @@ impl SolveCommand {
         let (problem, mut options, start) = self.input()?;
         let warm = start.as_ref().map(|start| start.point.clone());
         // The result does not depend on the number of threads.
-        options.threads = cores_or(None).min(MOST_THREADS);
+        options.threads = cores_or(None).min(MAX_THREADS);
         // Before the output file is created, so that a signal cannot leave it behind.
         let cancel = cancelled_by_signal();
         let stopped = cancel.clone();

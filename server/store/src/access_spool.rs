@@ -10,9 +10,9 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Number of lines that are read at a time.
-const AT_ONCE: usize = 200;
+const LINES_PER_READ: usize = 200;
 /// A longer line is no access.
-const LONGEST_LINE_BYTES: u64 = 1 << 16;
+const MAX_LINE_BYTES: u64 = 1 << 16;
 
 #[derive(Serialize, Deserialize)]
 struct SpoolLine {
@@ -76,9 +76,9 @@ impl Spool {
     /// If the file cannot be read.
     pub fn more(&mut self) -> StoreResult<Option<Vec<(Access, Tally)>>> {
         let (mut accesses, mut lines) = (Vec::new(), 0);
-        while lines < AT_ONCE {
+        while lines < LINES_PER_READ {
             let mut line = Vec::new();
-            let read = (&mut self.file).take(LONGEST_LINE_BYTES).read_until(b'\n', &mut line);
+            let read = (&mut self.file).take(MAX_LINE_BYTES).read_until(b'\n', &mut line);
             if read.map_err(|source| StoreError::Open { path: self.path.clone(), source })? == 0 {
                 break;
             }
@@ -129,7 +129,7 @@ mod tests {
             file.write_all(b"\xff\xfe\n{}\n").unwrap();
         };
         garbage();
-        for number in 0..AT_ONCE + 5 {
+        for number in 0..LINES_PER_READ + 5 {
             note(&record, &access(format!("study {number}, {}", "x".repeat(6000)))).unwrap();
         }
         garbage();
@@ -138,7 +138,7 @@ mod tests {
         while let Some(accesses) = spool.more().unwrap() {
             found.extend(accesses.into_iter().map(|(access, _)| access.object));
         }
-        assert_eq!(found.len(), AT_ONCE + 5);
+        assert_eq!(found.len(), LINES_PER_READ + 5);
         assert!(found.iter().enumerate().all(|(at, object)| object.starts_with(&format!("study {at},"))));
         spool.clear().unwrap();
         assert!(take(&record).unwrap().is_none());

@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 /// Largest text in a column of an archive, bytes. The program writes at most some hundred kilobytes.
-pub const LARGEST_TEXT_BYTES: usize = 4 << 20;
+pub const MAX_TEXT_BYTES: usize = 4 << 20;
 /// Largest compressed value in a column of an archive, bytes. An uploaded file has fewer.
-pub const LARGEST_BLOB_BYTES: usize = 16 << 20;
+pub const MAX_BLOB_BYTES: usize = 16 << 20;
 /// Maximum number of columns.
-const MOST_COLUMNS: usize = 64;
+const MAX_COLUMNS: usize = 64;
 /// JSON key of a binary value.
 const HEXADECIMAL: &str = "hexadecimal";
 
@@ -194,9 +194,9 @@ impl<'de> Visitor<'de> for CellVisitor {
     }
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Cell, E> {
-        if text.len() > LARGEST_TEXT_BYTES {
+        if text.len() > MAX_TEXT_BYTES {
             return Err(E::custom(format!(
-                "a string has {} bytes, but at most {LARGEST_TEXT_BYTES} are allowed",
+                "a string has {} bytes, but at most {MAX_TEXT_BYTES} are allowed",
                 text.len()
             )));
         }
@@ -260,9 +260,9 @@ impl Visitor<'_> for HexadecimalVisitor {
     }
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Hexadecimal, E> {
-        if text.len() > 2 * LARGEST_BLOB_BYTES {
+        if text.len() > 2 * MAX_BLOB_BYTES {
             return Err(E::custom(format!(
-                "a binary value has {} bytes, but at most {LARGEST_BLOB_BYTES} are allowed",
+                "a binary value has {} bytes, but at most {MAX_BLOB_BYTES} are allowed",
                 text.len() / 2
             )));
         }
@@ -289,8 +289,8 @@ impl<'de> Deserialize<'de> for Row {
             fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Row, A::Error> {
                 let mut cells = BTreeMap::new();
                 while let Some((Name(name), cell)) = map.next_entry::<Name, Cell>()? {
-                    if cells.len() == MOST_COLUMNS {
-                        return Err(A::Error::custom(format!("it has more than {MOST_COLUMNS} columns")));
+                    if cells.len() == MAX_COLUMNS {
+                        return Err(A::Error::custom(format!("it has more than {MAX_COLUMNS} columns")));
                     }
                     if cells.contains_key(&name) {
                         return Err(A::Error::custom(format!("column {name:?} occurs twice")));
@@ -335,7 +335,7 @@ mod tests {
             (r#"{"a": {"hexadecimal": "00", "b": 1}}"#.to_owned(), "other fields besides its binary value"),
             (r#"{"a": 1, "a": 2}"#.to_owned(), "twice"),
             (r#"{"a": 18446744073709551615}"#.to_owned(), "too large"),
-            (format!(r#"{{"a": "{}"}}"#, "x".repeat(LARGEST_TEXT_BYTES + 1)), "a string has"),
+            (format!(r#"{{"a": "{}"}}"#, "x".repeat(MAX_TEXT_BYTES + 1)), "a string has"),
             (format!(r#"{{"{}": 1}}"#, "x".repeat(101)), "a column name has more than"),
             ("[".repeat(100_000), "invalid type"),
         ] {

@@ -12,7 +12,7 @@ use std::time::SystemTime;
 /// Prefix of the names of scheduled backups.
 const SCHEDULED: &str = "scheduled";
 /// Longest path in a claim, bytes.
-const LONGEST_PATH: u64 = 1 << 16;
+const MAX_PATH: u64 = 1 << 16;
 
 /// A folder that this process has claimed for the backups of a record.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ impl BackupFolder {
         let mut file = open.map_err(cannot)?;
         let is_locked = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
         let mut owner = String::new();
-        (&file).take(LONGEST_PATH).read_to_string(&mut owner).map_err(cannot)?;
+        (&file).take(MAX_PATH).read_to_string(&mut owner).map_err(cannot)?;
         if is_locked || !(owner.is_empty() || owner.trim_end() == own) {
             let (folder, record) = (folder.to_owned(), owner.trim_end().to_owned());
             return Err(StoreError::FolderOfOther { folder, record, claim });
@@ -62,7 +62,7 @@ impl BackupFolder {
         let mut owner = String::new();
         match File::open(&claim) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-            file => file.and_then(|file| file.take(LONGEST_PATH).read_to_string(&mut owner)).map_err(cannot)?,
+            file => file.and_then(|file| file.take(MAX_PATH).read_to_string(&mut owner)).map_err(cannot)?,
         };
         let own = record.canonicalize().unwrap_or_else(|_| record.to_owned());
         if owner.is_empty() || owner.trim_end() == own.to_string_lossy() {

@@ -12,7 +12,7 @@ use std::io::Read;
 /// zstd level. Higher levels are slow and gain little for trajectories.
 const COMPRESSION: i32 = 9;
 /// Largest uncompressed value, twice the largest upload.
-const LARGEST_BYTES: u64 = 32 << 20;
+const MAX_BYTES: u64 = 32 << 20;
 /// Largest accepted zstd window, as a power of two.
 const WINDOW_LOG: u32 = 23;
 
@@ -41,26 +41,26 @@ pub(super) fn optional_column<T: DeserializeOwned>(row: &SqliteRow, name: &'stat
 }
 
 pub(super) fn compress(_: &OnPool, what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
-    if bytes.len() as u64 > LARGEST_BYTES {
-        let reason = format!("it has {} bytes, but at most {LARGEST_BYTES} are allowed", bytes.len());
+    if bytes.len() as u64 > MAX_BYTES {
+        let reason = format!("it has {} bytes, but at most {MAX_BYTES} are allowed", bytes.len());
         return Err(StoreError::Damaged { what, reason });
     }
     zstd::encode_all(bytes, COMPRESSION).map_err(|e| StoreError::Damaged { what, reason: e.to_string() })
 }
 
-/// Decompresses a value, up to [`LARGEST_BYTES`].
+/// Decompresses a value, up to [`MAX_BYTES`].
 pub(super) fn decompress(_: &OnPool, what: &'static str, bytes: &[u8]) -> StoreResult<Vec<u8>> {
     let damaged = |reason: String| StoreError::Damaged { what, reason };
     let read = || {
         let mut decoder = zstd::Decoder::with_buffer(bytes)?;
         decoder.window_log_max(WINDOW_LOG)?;
         let mut content = Vec::new();
-        decoder.take(LARGEST_BYTES + 1).read_to_end(&mut content)?;
+        decoder.take(MAX_BYTES + 1).read_to_end(&mut content)?;
         Ok(content)
     };
     let content = read().map_err(|e: std::io::Error| damaged(e.to_string()))?;
-    if content.len() as u64 > LARGEST_BYTES {
-        return Err(damaged(format!("it expands to more than {LARGEST_BYTES} bytes")));
+    if content.len() as u64 > MAX_BYTES {
+        return Err(damaged(format!("it expands to more than {MAX_BYTES} bytes")));
     }
     Ok(content)
 }

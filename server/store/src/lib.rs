@@ -114,12 +114,12 @@ use tokio::sync::Mutex;
 use writer::{Outside, Writing};
 
 /// Least time between two probes.
-const PROBED_AGAIN: Duration = Duration::from_secs(1);
+const PROBE_INTERVAL: Duration = Duration::from_secs(1);
 /// When it was last tried whether the record can be written, and the result.
 type Probe = (std::time::Instant, Result<(), String>);
 
 /// Time limit of a probe.
-const SLOWEST_PROBE: Duration = Duration::from_secs(5);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// The open record. It lends either connections or the thread pool, never both at once.
 ///
@@ -327,16 +327,16 @@ impl Store {
     pub async fn probe(&self) -> Result<(), String> {
         let mut last = self.probed.lock().await;
         if let Some((at, found)) = &*last
-            && at.elapsed() < PROBED_AGAIN
+            && at.elapsed() < PROBE_INTERVAL
         {
             return found.clone();
         }
-        let found = match tokio::time::timeout(SLOWEST_PROBE, self.write_nothing()).await {
+        let found = match tokio::time::timeout(PROBE_TIMEOUT, self.write_nothing()).await {
             Ok(Ok(())) if !self.writing.space().has_room_for_change() => {
                 Err("the disk that holds the record is full".to_owned())
             }
             Ok(written) => written.map_err(|error| error.to_string()),
-            Err(_) => Err(format!("a test write took longer than {} s", SLOWEST_PROBE.as_secs())),
+            Err(_) => Err(format!("a test write took longer than {} s", PROBE_TIMEOUT.as_secs())),
         };
         *last = Some((std::time::Instant::now(), found.clone()));
         found

@@ -21,10 +21,10 @@ use tokio_util::task::AbortOnDropHandle;
 type LentConnection = Arc<tokio::sync::Mutex<Option<SqliteConnection>>>;
 
 /// A log with this number of frames is checkpointed into the database file.
-const LONGEST_LOG: u32 = 1000;
+const CHECKPOINT_FRAMES: u32 = 1000;
 
 /// Pause before a restart of the flushing task.
-const PAUSE: Duration = Duration::from_millis(100);
+const RESTART_PAUSE: Duration = Duration::from_millis(100);
 
 /// The result of a group commit; `None` until it is known.
 type CommitOutcome = Option<Result<(), Arc<StoreError>>>;
@@ -212,7 +212,7 @@ impl Shared {
         match self.make_durable(connection).await {
             Ok(frames) => {
                 self.tell(Ok(()));
-                if frames >= LONGEST_LOG {
+                if frames >= CHECKPOINT_FRAMES {
                     fold(connection).await;
                 }
             }
@@ -300,7 +300,7 @@ async fn supervise_flushing(line: LentConnection, shared: Arc<Shared>) {
             Err(error) => tracing::error!(%error, "the commit task panicked; restarting it"),
         }
         shared.ended.notify_one();
-        tokio::time::sleep(PAUSE).await;
+        tokio::time::sleep(RESTART_PAUSE).await;
     }
 }
 

@@ -36,7 +36,7 @@ fn detonate(folder: &Path, bomb: &[u8]) -> (bool, String, u64) {
 }
 
 /// Maximum memory of an import, whatever the archive.
-const MOST_MEMORY_BYTES: u64 = 320 << 20;
+const MAX_MEMORY_BYTES: u64 = 320 << 20;
 
 /// A compressed archive of content that is made as it is compressed.
 fn streamed(write: impl FnOnce(&mut dyn Write)) -> Vec<u8> {
@@ -226,7 +226,7 @@ async fn decompression_bombs_are_refused_within_bounded_memory() {
             peak >> 20,
             text.trim().chars().take(160).collect::<String>()
         );
-        if !refused || peak > MOST_MEMORY_BYTES || folder.path().join("bombed.db").exists() {
+        if !refused || peak > MAX_MEMORY_BYTES || folder.path().join("bombed.db").exists() {
             failed.push(format!("{what}: refused {refused}, peak {} MiB, {text}", peak >> 20));
         }
     }

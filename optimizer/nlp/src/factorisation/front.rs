@@ -31,16 +31,16 @@ pub(super) enum PivotKind {
 /// Space of a front for rows that stage 1 defers to stage 2 because none of its variables can be their pivot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RoomForDeferred {
-    /// The padding of the columns, which costs nothing; at most [`MOST_DEFERRED`] rows.
+    /// The padding of the columns, which costs nothing; at most [`MAX_DEFERRED`] rows.
     Padding,
-    /// [`MOST_DEFERRED`] rows.
+    /// [`MAX_DEFERRED`] rows.
     Full,
 }
 
 /// Largest number of deferred rows of a front.
-const MOST_DEFERRED: usize = 3;
+const MAX_DEFERRED: usize = 3;
 /// Smallest number of rows for which stage 1 pays.
-const FEWEST_ROWS: usize = 6;
+const MIN_ROWS: usize = 6;
 
 /// Structure of a front.
 #[derive(Debug, Default)]
@@ -158,7 +158,7 @@ impl Front {
         let variables: Vec<usize> = pivots.iter().copied().filter(|i| kinds[*i] == PivotKind::Variable).collect();
         let rows: Vec<usize> = pivots.iter().copied().filter(is_row).collect();
         let mut front = Self { border, ..Self::default() };
-        if rows.len() >= FEWEST_ROWS && rows.len() <= variables.len() {
+        if rows.len() >= MIN_ROWS && rows.len() <= variables.len() {
             front.others = pivots.iter().copied().filter(|i| kinds[*i] != PivotKind::Variable && !is_row(i)).collect();
             (front.variables, front.rows) = (variables, rows);
         } else {
@@ -168,7 +168,7 @@ impl Front {
         if rows > 0 {
             let unused = padded(front.slots()) - front.slots();
             front.most_deferred =
-                if room == RoomForDeferred::Full { MOST_DEFERRED } else { MOST_DEFERRED.min(unused / 2) };
+                if room == RoomForDeferred::Full { MAX_DEFERRED } else { MAX_DEFERRED.min(unused / 2) };
         }
         let size = front.slots();
         front.tall = padded(variables);

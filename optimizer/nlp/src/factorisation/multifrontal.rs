@@ -22,7 +22,7 @@ use super::dense_kernels::all_finite;
 use super::front::{ChildMap, Front, FrontPlace, PivotKind, RoomForDeferred};
 use super::front_factor::FrontFactor;
 use super::kkt_solver::{Inertia, KktSolver, MatrixChange};
-use super::null_space::{self, LARGEST_DIAGONAL, Workspace};
+use super::null_space::{self, MAX_DIAGONAL, Workspace};
 use super::schedule::{Direction, Schedule, SubtreeTask};
 use super::substitution::{Substitution, SubstitutionWorkspace};
 use super::symbolic_analysis::{analyse, postordered};
@@ -30,7 +30,7 @@ use super::thread_pool::{SharedWork, ThreadPool, lock};
 use crate::status::NlpError;
 
 /// Number of operations below which threads cost more than they save.
-const WORTH_A_THREAD: f64 = 8e6;
+const MIN_OPERATIONS_PER_THREAD: f64 = 8e6;
 
 /// Analysis, factor and work space.
 pub(super) struct Multifrontal {
@@ -104,7 +104,7 @@ impl Multifrontal {
             analyse(column_starts, row_indices, &members, kinds, room).ok_or_else(|| fail("a front is too large"))?;
         let mut factors: Vec<FrontFactor> = fronts.iter().map(FrontFactor::new).collect();
         let flops: f64 = fronts.iter().map(|f| f.flops).sum();
-        let threads = if flops < WORTH_A_THREAD { 1 } else { threads.max(1) };
+        let threads = if flops < MIN_OPERATIONS_PER_THREAD { 1 } else { threads.max(1) };
         let schedule = Schedule::new(&fronts, threads);
         for root in schedule.tasks.iter().map(|task| task.end - 1) {
             factors[root].schur = vec![0.0; fronts[root].schur_length()];
@@ -307,7 +307,7 @@ fn add_child(front: &Front, numbers: &mut [f64], schur: &[f64], map: &ChildMap) 
 
 impl KktSolver for Multifrontal {
     fn suits(&self, values: &[f64]) -> bool {
-        self.neglected.iter().all(|&q| values[q as usize].abs() <= LARGEST_DIAGONAL)
+        self.neglected.iter().all(|&q| values[q as usize].abs() <= MAX_DIAGONAL)
     }
 
     fn factor(&mut self, values: &[f64], change: MatrixChange) -> Option<Inertia> {

@@ -26,9 +26,9 @@ use super::dense_kernels::{
 use super::front::Front;
 
 /// A row is deferred if its pivot is below this fraction of its largest entry.
-const SMALLEST_PIVOT: f64 = 1e-8;
+const MIN_PIVOT: f64 = 1e-8;
 /// Largest negligible diagonal.
-pub(super) const LARGEST_DIAGONAL: f64 = 1e-6;
+pub(super) const MAX_DIAGONAL: f64 = 1e-6;
 
 /// The variable and the row at each position of the LU factors.
 #[derive(Debug, Default)]
@@ -207,7 +207,7 @@ fn factor<S: Simd>(
         let column = &lu[t * tall..t * tall + variables];
         let (largest, at) = largest_entry(column, t);
         // NaN is not an acceptable pivot.
-        let acceptable = largest > SMALLEST_PIVOT * largest_magnitude(column);
+        let acceptable = largest > MIN_PIVOT * largest_magnitude(column);
         if !acceptable {
             count -= 1;
             if null_space.rows.len() - count > front.most_deferred {

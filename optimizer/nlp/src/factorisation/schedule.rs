@@ -56,7 +56,7 @@ pub(super) struct Schedule {
 /// A subtree is split until its work is at most a thread's share divided by this.
 const TASKS_PER_SHARE: usize = 4;
 /// Number of unsuccessful attempts to get a task before a thread yields.
-const LOOKS: usize = 100;
+const ATTEMPTS_BEFORE_YIELD: usize = 100;
 /// Pauses between two attempts.
 const SPINS: usize = 20;
 
@@ -147,7 +147,7 @@ impl Schedule {
             };
             let Some(k) = taken else {
                 looks += 1;
-                if looks % LOOKS == 0 {
+                if looks % ATTEMPTS_BEFORE_YIELD == 0 {
                     yield_now();
                 } else {
                     (0..SPINS).for_each(|_| spin_loop());

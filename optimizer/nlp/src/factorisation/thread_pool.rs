@@ -14,7 +14,7 @@ pub(super) trait SharedWork: Send + Sync + 'static {
 }
 
 /// Checks for a call before a thread yields, and yields before it sleeps.
-const LOOKS: usize = 500;
+const CHECKS_BEFORE_YIELD: usize = 500;
 const YIELDS: usize = 200;
 
 #[derive(Debug, Default)]
@@ -58,7 +58,7 @@ impl ThreadPool {
         let mut looks = 0;
         while signal.finished.load(Ordering::Acquire) < calls * self.members.len() {
             looks += 1;
-            if looks % LOOKS == 0 { yield_now() } else { spin_loop() }
+            if looks % CHECKS_BEFORE_YIELD == 0 { yield_now() } else { spin_loop() }
         }
         !signal.failed.load(Ordering::Acquire)
     }
@@ -88,10 +88,10 @@ fn serve(job: &impl SharedWork, signal: &Signal, member: usize) {
             continue;
         }
         looks += 1;
-        if looks >= LOOKS * YIELDS {
+        if looks >= CHECKS_BEFORE_YIELD * YIELDS {
             park();
             looks = 0;
-        } else if looks % LOOKS == 0 {
+        } else if looks % CHECKS_BEFORE_YIELD == 0 {
             yield_now();
         } else {
             spin_loop();

@@ -16,7 +16,7 @@ const POLE: f64 = 0.5;
 const LENGTH: f64 = 0.5;
 const GRAVITY: f64 = 9.806;
 /// Largest force, N, and the end of the track, m.
-const LARGEST_FORCE: f64 = 20.0;
+const MAX_FORCE: f64 = 20.0;
 const TRACK: f64 = 2.0;
 /// First and last state: cart (m), pole from hanging down (rad), and their rates.
 const FIRST: [f64; 4] = [0.0; 4];
@@ -139,7 +139,7 @@ impl NonlinearProgram for SwingUp {
             upper.fill(f64::INFINITY);
             (lower[0], upper[0]) = (0.0, TRACK);
             if let (Some(low), Some(high)) = (lower.get_mut(4), upper.get_mut(4)) {
-                (*low, *high) = (-LARGEST_FORCE, LARGEST_FORCE);
+                (*low, *high) = (-MAX_FORCE, MAX_FORCE);
             }
             for (at, state) in [(0, FIRST), (self.intervals, LAST)] {
                 if point == at {

@@ -108,7 +108,7 @@ pub fn of_reference_in_one_chart(reference: &ReferenceGait) -> Chart {
     let known = every_angle().filter(|angle| angle.column.is_some()).enumerate();
     known.fold(chart("Reference gait", CYCLE), |chart, (place, angle)| {
         let label = angle.title.to_lowercase();
-        let look = Look { label: &label, colour: place, stroke: Stroke::APART[place % Stroke::APART.len()] };
+        let look = Look { label: &label, colour: place, stroke: Stroke::DISTINCT[place % Stroke::DISTINCT.len()] };
         angle.with_reference(chart, reference, &look, None)
     })
 }

@@ -13,7 +13,7 @@ const PICTURES: usize = 61;
 const MARK_M: f64 = 0.25;
 
 /// Longest stride that is drawn, m.
-const LONGEST_STRIDE_M: f64 = 5.0;
+const MAX_STRIDE_M: f64 = 5.0;
 
 /// One stride of a walker that repeats.
 #[derive(Debug, Clone)]
@@ -94,7 +94,7 @@ impl Animation {
     fn draw_ground(&self, svg: &mut String, clock: &PictureTimes) -> std::fmt::Result {
         let [left, _, width, _] = self.walker.view_box();
         // A malformed gait may have any length.
-        let stride_m = self.walker.stride_length_m.clamp(MARK_M, LONGEST_STRIDE_M);
+        let stride_m = self.walker.stride_length_m.clamp(MARK_M, MAX_STRIDE_M);
         let stride = stride_m * UNITS_PER_M;
         let mark = stride / (stride_m / MARK_M).round();
         write!(svg, "<path class=\"ground\" d=\"M{left} 0h{width}\"/><path class=\"ground\" d=\"")?;

@@ -11,7 +11,7 @@ use gait_optimizer::{Gait, ModelError, ReferenceGait};
 use std::fmt::Write;
 
 /// Space beside the feet, above the head and below the ground, in units of the drawing.
-const BESIDE: f64 = 9.0;
+const DRAWING_MARGIN: f64 = 9.0;
 const ABOVE: f64 = 4.0;
 const BELOW: f64 = 22.0;
 /// From hip to the top of the head, in lengths of the trunk.
@@ -19,7 +19,7 @@ const TOP_OF_HEAD: f64 = 1.63;
 /// Length of the arrow of a ground reaction force of one body weight, in units of the drawing.
 const BODY_WEIGHT: f64 = 50.0;
 /// Forces below this have no centre of pressure worth drawing, N.
-const LEAST_FORCE_N: f64 = 10.0;
+const MIN_FORCE_N: f64 = 10.0;
 /// Number of instants of a reference gait; the last one is the first of the next stride.
 const GHOST_INSTANTS: usize = 51;
 
@@ -122,7 +122,7 @@ impl GaitWalker {
         let most = |of: &dyn Fn(&StickFigure) -> f64| {
             self.stick_figures.iter().map(of).filter(|value| value.is_finite()).fold(0.5, f64::max) * UNITS_PER_M
         };
-        let (top, half) = ((most(&top) + ABOVE).round(), (most(&reach) + BESIDE).round());
+        let (top, half) = ((most(&top) + ABOVE).round(), (most(&reach) + DRAWING_MARGIN).round());
         [-half, -top, 2.0 * half, top + BELOW]
     }
 
@@ -239,7 +239,7 @@ impl GaitWalker {
 /// Centre of pressure, m, and ground reaction force, N, of a foot on the ground.
 fn ground_reaction(leg: &LegPoints, heel: [f64; 2], toe: [f64; 2]) -> Option<(f64, [f64; 2])> {
     let force = [heel[0] + toe[0], heel[1] + toe[1]];
-    (force[1] >= LEAST_FORCE_N).then(|| ((heel[1] * leg.heel[0] + toe[1] * leg.toe[0]) / force[1], force))
+    (force[1] >= MIN_FORCE_N).then(|| ((heel[1] * leg.heel[0] + toe[1] * leg.toe[0]) / force[1], force))
 }
 
 /// An arrow from a place on the ground.

@@ -10,7 +10,7 @@ use axum::response::Response;
 use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab_script::{self, AskRequest, SuggestedTrial, TellRequest};
-use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
+use gaitwright_service::studies::snapshot::{MAX_TRIES, has_changed};
 use gaitwright_store::{StudyId, TrialId};
 use serde::Deserialize;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ pub(super) async fn ask(
     IdempotentWith(request, ask): IdempotentWith<Run, AskRequest>,
 ) -> Result<Response, Refusal> {
     let script = ask.script.as_deref().unwrap_or(&request.caller.name).trim();
-    for _ in 0..MOST_TRIES {
+    for _ in 0..MAX_TRIES {
         let analyses = Arc::clone(&app.analyses);
         let suggestion = lab_script::suggest(app.store_mut(), id, script, &analyses).await;
         let mut writer = match request.begin(&app).await? {
@@ -84,7 +84,7 @@ pub(super) async fn tell(
     Id(id, _): Id<TrialId, Run>,
     IdempotentWith(request, tell): IdempotentWith<Run, TellRequest>,
 ) -> Result<Response, Refusal> {
-    for _ in 0..MOST_TRIES {
+    for _ in 0..MAX_TRIES {
         let checked = lab_script::check_result(app.store_mut(), id, &tell).await;
         let mut writer = match request.begin(&app).await? {
             Ok(writer) => writer,

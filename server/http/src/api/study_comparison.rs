@@ -22,9 +22,9 @@ use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// Maximum number of compared studies.
-const MOST: usize = 20;
+const MAX_STUDIES: usize = 20;
 /// Maximum number on a page, whatever its `limit`: a request waits for the posterior of each.
-const MOST_ON_A_PAGE: u32 = 5;
+const MAX_ON_A_PAGE: u32 = 5;
 
 /// Studies to compare.
 #[derive(Debug, Deserialize)]
@@ -42,12 +42,12 @@ impl TryFrom<String> for DifferentStudies {
     type Error = String;
 
     fn try_from(ids: String) -> Result<Self, String> {
-        let refused = || format!("2 to {MOST} comma-separated identifiers of different studies");
+        let refused = || format!("2 to {MAX_STUDIES} comma-separated identifiers of different studies");
         let ids: Result<Vec<Named<StudyId>>, _> =
             ids.split(',').map(str::trim).filter(|id| !id.is_empty()).map(str::parse).collect();
         let ids = ids.map_err(|_| refused())?;
         let is_repeated = |(place, id): (usize, &Named<StudyId>)| ids[..place].contains(id);
-        if !(2..=MOST).contains(&ids.len()) || ids.iter().enumerate().any(is_repeated) {
+        if !(2..=MAX_STUDIES).contains(&ids.len()) || ids.iter().enumerate().any(is_repeated) {
             return Err(refused());
         }
         Ok(Self(ids))
@@ -105,7 +105,7 @@ pub(super) async fn get(
     State(mut app): State<AppState>,
     paging: Paging<u32, ComparisonQuery>,
 ) -> Result<Json<Page<StudyComparison>>, Refusal> {
-    let paging = paging.at_most(MOST_ON_A_PAGE);
+    let paging = paging.at_most(MAX_ON_A_PAGE);
     // The place in `ids` identifies a study: a cursor belongs to one value of `ids`.
     let mut compared: Vec<(u32, Study)> = Vec::new();
     for (place, id) in (0..).zip(&paging.filter.ids.0) {

@@ -28,7 +28,7 @@ use gaitwright_store::{StudyId, TrialId, studies};
 use std::cmp::Ordering;
 
 /// So many gaits and answers are listed.
-const LISTED: usize = 24;
+const MAX_LISTED: usize = 24;
 /// So many trials of one gait are named.
 const NAMED: usize = 6;
 
@@ -158,8 +158,8 @@ fn show(
         agreement: analysis.agreement,
         certainty: certainty(snapshot, analysis),
         recommends,
-        gaits: analysis.gaits.iter().take(LISTED).map(|gait| gait_row(gait, analysis, snapshot)).collect(),
-        more_gaits: analysis.gaits.len().saturating_sub(LISTED),
+        gaits: analysis.gaits.iter().take(MAX_LISTED).map(|gait| gait_row(gait, analysis, snapshot)).collect(),
+        more_gaits: analysis.gaits.len().saturating_sub(MAX_LISTED),
         main_effects: main_effects(analysis),
         legend: shared_legend(&mut marginals),
         marginals,
@@ -171,10 +171,10 @@ fn show(
         surprising_answers: analysis
             .surprising_answers
             .iter()
-            .take(LISTED)
+            .take(MAX_LISTED)
             .filter_map(|s| surprising_answer_row(s, snapshot))
             .collect(),
-        more_surprising_answers: analysis.surprising_answers.len().saturating_sub(LISTED),
+        more_surprising_answers: analysis.surprising_answers.len().saturating_sub(MAX_LISTED),
     })
 }
 

@@ -23,7 +23,7 @@ use gaitwright_charts::Figure;
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::{self, Caller, Read};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::analysis::MANY;
+use gaitwright_service::studies::analysis::MAX_TRIALS_TO_WAIT_FOR;
 use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
 use gaitwright_service::studies::recorded_answer::RecordedAnswer;
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -156,7 +156,7 @@ struct OfferedGait {
 const OFFERED: u32 = 200;
 
 /// How many of the newest gaits without a certificate are certified when the page is opened.
-const CERTIFIED_AT_ONCE: usize = 10;
+const CERTIFIED_ON_OPENING: usize = 10;
 
 /// `GET /studies/{id}/compare`.
 pub(super) async fn get(
@@ -198,7 +198,7 @@ async fn show(
     let study = studies::get(&mut reader, id).await?;
     let is_going_on = matches!(study.state, StudyState::Running | StudyState::Waiting);
     let reference = reference_gaits::get(&mut reader, study.plan.reference_gait_id).await?.definition;
-    let large = trials::counts(&mut reader, id).await?.total as usize >= MANY;
+    let large = trials::counts(&mut reader, id).await?.total as usize >= MAX_TRIALS_TO_WAIT_FOR;
     let snapshot = if large {
         StudySnapshot::newest(&mut reader, study, OFFERED).await?
     } else {
@@ -231,7 +231,7 @@ async fn show(
     let waits = pending.is_some();
     let mut being_certified = 0;
     for trial in
-        snapshot.trials.iter().rev().filter(|trial| snapshot.waits_for_certificate(trial)).take(CERTIFIED_AT_ONCE)
+        snapshot.trials.iter().rev().filter(|trial| snapshot.waits_for_certificate(trial)).take(CERTIFIED_ON_OPENING)
     {
         being_certified += usize::from(app.scheduler.certify(trial.id));
     }

@@ -8,7 +8,7 @@ use gaitwright_charts::Chart;
 use gaitwright_service::studies::lab::{ColumnTrace, EmgOverview, EmgReading};
 
 /// Largest number of columns that are drawn.
-const MOST_DRAWN: usize = 48;
+const MAX_DRAWN: usize = 48;
 /// The note of the chart of a column with heel strikes.
 const OF_STRIKES: &str = "Heel strikes are where this signal rises above the threshold.";
 
@@ -45,7 +45,7 @@ impl SignalsPreview {
             let threshold = of_strikes(column).then_some(reading.heel_strike_threshold);
             (column_trace(&column.name, &column.points, strikes, threshold), threshold.is_some())
         };
-        let drawn = overview.columns.iter().take(MOST_DRAWN).map(chart);
+        let drawn = overview.columns.iter().take(MAX_DRAWN).map(chart);
         let mut charts: Vec<PageChart> = drawn
             .map(|(chart, of_strikes)| PageChart {
                 note: if of_strikes { OF_STRIKES } else { "" },
@@ -55,7 +55,7 @@ impl SignalsPreview {
         Self {
             legend: shared_legend(&mut charts),
             charts,
-            not_drawn: overview.columns.len().saturating_sub(MOST_DRAWN),
+            not_drawn: overview.columns.len().saturating_sub(MAX_DRAWN),
             ..Self::without_charts(overview, reading, labels)
         }
     }

@@ -16,7 +16,7 @@ use gaitwright_service::access::Run;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::explanation::{self, Elapsed, ExplanationEffort, ExplanationState};
 use gaitwright_service::studies::relaxed_trial::{self, NoRelaxedTrial, RelaxedBounds, RelaxedTrial};
-use gaitwright_service::studies::snapshot::{MOST_TRIES, has_changed};
+use gaitwright_service::studies::snapshot::{MAX_TRIES, has_changed};
 use gaitwright_store::studies::Study;
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Connection, TrialId, commit};
@@ -158,7 +158,7 @@ pub(super) async fn try_relaxed(
     Id(id, _): Id<TrialId, Run>,
     Form(form): Form<ChosenRelaxation>,
 ) -> Result<Redirect, PageError> {
-    for _ in 0..MOST_TRIES {
+    for _ in 0..MAX_TRIES {
         let analyses = Arc::clone(&app.analyses);
         let chosen = relaxed_trial::choose(app.store_mut(), id, form.relaxation, &analyses).await?;
         let mut writer = app.write().await?;

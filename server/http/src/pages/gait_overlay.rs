@@ -6,7 +6,7 @@ use gait_optimizer::ReferenceGait;
 use gaitwright_charts::gait_charts::Group;
 use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::overlaid_gaits::{self, MOST_OTHERS};
+use gaitwright_service::studies::overlaid_gaits::{self, MAX_OTHERS};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Connection, TrialId, trials};
 
@@ -61,7 +61,7 @@ impl GaitOverlay {
         let identifiers: Vec<String> = chosen.iter().map(TrialId::to_string).collect();
         Ok(Self {
             offered: pools.iter().filter_map(|pool| OfferedTrials::of(pool, chosen)).collect(),
-            most: MOST_OTHERS,
+            most: MAX_OTHERS,
             newest_only: trials::counts(db, trial.study_id).await?.total > OFFERED,
             refused,
             query: format!("?other={}", identifiers.join(",")),

@@ -17,7 +17,7 @@ use gaitwright_store::{Instant, LabSessionId, accessible_studies, commit, lab_se
 use serde::Deserialize;
 
 /// How many of the newest open sessions are listed.
-const LISTED: u32 = 100;
+const MAX_LISTED_SESSIONS: u32 = 100;
 /// How long a closed session stays in the list, s: a fall may be reported late.
 const LISTED_SECONDS: i64 = 7 * 86_400;
 
@@ -72,7 +72,7 @@ pub(super) async fn list(authorized: Authorized<Rate>, State(app): State<AppStat
     let mut reader = app.read().await?;
     let mut sessions = Vec::new();
     let since = now().plus_seconds(-LISTED_SECONDS);
-    for session in lab_sessions::open_since(&mut reader, authorized.caller.reach(), LISTED, since).await? {
+    for session in lab_sessions::open_since(&mut reader, authorized.caller.reach(), MAX_LISTED_SESSIONS, since).await? {
         let seen = lab::session_progress(&mut reader, session.id).await?;
         let next = match (seen.walk, seen.answer_number) {
             _ if seen.closed => "closed; a walk can still be reported as unsafe".to_owned(),

@@ -7,7 +7,7 @@ use super::form_numbers::number;
 use super::joint_angle_form::JointAngleFields;
 use super::recording_preview::RecordingPreview;
 use crate::refused_fields::{FieldLabels, RefusedFields, TypedForm};
-use gait_optimizer::emg::{EmgSettings, HIGHEST_RATE_HZ};
+use gait_optimizer::emg::{EmgSettings, MAX_RATE_HZ};
 use gaitwright_service::error::Error;
 use serde::Deserialize;
 
@@ -36,7 +36,7 @@ impl FilterFields {
     /// The settings, as far as they can be checked without a recording.
     pub(super) fn read_and_check(&self) -> Result<EmgSettings, Error> {
         let settings = self.read()?;
-        settings.validate(HIGHEST_RATE_HZ)?;
+        settings.validate(MAX_RATE_HZ)?;
         Ok(settings)
     }
 }

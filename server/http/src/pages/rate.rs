@@ -57,17 +57,17 @@ impl RatePage {
     /// Seconds until the next pair appears automatically, after the time to undo an answer.
     fn pause(&self) -> u32 {
         match (self.nothing, self.undo) {
-            (true, _) => LOOK_AGAIN_S,
+            (true, _) => POLL_INTERVAL_S,
             (false, Some(_)) => 0,
-            (false, None) => READ_S,
+            (false, None) => CONFIRMATION_S,
         }
     }
 }
 
 /// Time between two requests for the next pair while there is none, s.
-const LOOK_AGAIN_S: u32 = 5;
+const POLL_INTERVAL_S: u32 = 5;
 /// Time to read a confirmation that cannot be undone, s.
-const READ_S: u32 = 2;
+const CONFIRMATION_S: u32 = 2;
 
 /// An answer, read from the record.
 struct SavedBlindAnswer {

@@ -238,7 +238,7 @@ async fn account_of(
     let shown = AccountPage {
         name: user.name.clone(),
         role: user.role,
-        shortest: password::SHORTEST,
+        shortest: password::MIN_LENGTH,
         must_confirm_password: sign_in::must_confirm_password(&mut reader, &user, session_of(headers)).await?,
         sessions: own_sessions(&mut reader, app, user.id, session_of(headers), now).await?,
         refused: RefusedFields::default(),

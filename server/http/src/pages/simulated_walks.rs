@@ -4,8 +4,8 @@ use crate::format;
 use crate::refused_fields::{FieldLabels, TypedForm};
 use gait_optimizer::execution::{ExecutionReport, SimulatedWalksOnGround};
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::execution::{MOST_SIMULATED_WALKS, NewExecutionReport, Simulation};
-use gaitwright_service::studies::seed::LARGEST_SEED;
+use gaitwright_service::studies::execution::{MAX_SIMULATED_WALKS, NewExecutionReport, Simulation};
+use gaitwright_service::studies::seed::MAX_SEED;
 use gaitwright_store::Instant;
 use gaitwright_store::execution_reports::{ExecutionReported, StoredReport};
 use serde::Deserialize;
@@ -51,11 +51,11 @@ impl SimulatedWalksSection {
     }
 
     pub(super) fn most_walks() -> u32 {
-        MOST_SIMULATED_WALKS
+        MAX_SIMULATED_WALKS
     }
 
     pub(super) fn largest_seed() -> u64 {
-        LARGEST_SEED
+        MAX_SEED
     }
 }
 
@@ -135,10 +135,10 @@ impl SimulationFields {
                 Error::invalid(
                     "number_of_simulated_walks",
                     self.number_of_simulated_walks.as_str(),
-                    &format!("1 to {MOST_SIMULATED_WALKS}"),
+                    &format!("1 to {MAX_SIMULATED_WALKS}"),
                 )
             })?,
-            seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {LARGEST_SEED}")))?,
+            seed: seed.map_err(|_| Error::invalid("seed", self.seed.as_str(), &format!("0 to {MAX_SEED}")))?,
         };
         asked.options()?;
         Ok(asked)

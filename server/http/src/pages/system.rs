@@ -116,7 +116,7 @@ enum BackupNotice {
 }
 
 /// Time that the page waits for a backup.
-const PATIENCE: Duration = Duration::from_secs(20);
+const BACKUP_WAIT: Duration = Duration::from_secs(20);
 
 /// `POST /system/backup`: copies the record to a new file beside it, and checks the copy.
 pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): State<AppState>) -> PageResult {
@@ -126,7 +126,7 @@ pub(super) async fn make_backup(authorized: Authorized<Administer>, State(app): 
     commit(writer).await?;
     let id = requested.id;
     // A backup that takes longer continues in the background.
-    let _ = tokio::time::timeout(PATIENCE, requested.begin(app.store().clone(), actor.clone())).await;
+    let _ = tokio::time::timeout(BACKUP_WAIT, requested.begin(app.store().clone(), actor.clone())).await;
     let mut reader = app.read().await?;
     let notice = match app.backups.find(&mut reader, id).await? {
         Some((JobState::Done, _)) => BackupNotice::Complete { file: backups::get(&mut reader, id).await?.file },

@@ -38,7 +38,7 @@ const SCOPES: [(Right, &str); 5] = [
 ];
 
 /// How many networks with failed sign-ins are shown.
-const MOST_SOURCES: u32 = 20;
+const MAX_SOURCES: u32 = 20;
 
 #[derive(Template)]
 #[template(path = "users.html")]
@@ -166,7 +166,7 @@ async fn show(app: &AppState, outcome: ActionOutcome, refused: RefusedFields, en
     let (users, tokens) = (users::all(&mut reader).await?, tokens::all(&mut reader).await?);
     let now = app.access.clock.now(&mut reader).await?;
     let sessions = session::live(&mut reader, None, app.access.limits, now).await?;
-    let failures = sign_in_failures::most(&mut reader, MOST_SOURCES).await?;
+    let failures = sign_in_failures::most(&mut reader, MAX_SOURCES).await?;
     page(&UsersPage { users, tokens, sessions, failures, roles: Role::ALL, scopes: SCOPES, outcome, refused, entries })
 }
 

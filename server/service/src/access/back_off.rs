@@ -23,11 +23,11 @@ const NETWORK: Limit = Limit { free: 3, longest: Duration::from_mins(15) };
 const SITE: Limit = Limit { free: 6, longest: Duration::from_mins(15) };
 /// Allows one guess each ten seconds. An attacker uses these up only with a guess from another site each time: one site
 /// has four guesses an hour.
-const EVERYWHERE: Limit = Limit { free: 50, longest: Duration::from_secs(10) };
+const ALL_NETWORKS_LIMIT: Limit = Limit { free: 50, longest: Duration::from_secs(10) };
 /// Source of the failures of all networks.
 const ALL_NETWORKS: &str = "*";
 /// Number of names of one network that are counted separately; further names share a count.
-const MOST_NAMES: u32 = 1000;
+const MAX_NAMES: u32 = 1000;
 /// Time after the last failure until failures are forgotten.
 const REMEMBERED_SECONDS: i64 = 24 * 3600;
 /// Key of the shared count. No name contains a line break.
@@ -79,7 +79,7 @@ pub async fn begin(
     let mut is_new_name = own.failures(writer).await?.is_none();
     if is_new_name && origin.known.is_none() {
         let network = failures::of_network(writer, &origin.network).await?;
-        if network.is_some_and(|network| network.names >= MOST_NAMES) {
+        if network.is_some_and(|network| network.names >= MAX_NAMES) {
             OTHER_NAMES.clone_into(&mut own.name);
             is_new_name = own.failures(writer).await?.is_none();
         }
@@ -88,10 +88,10 @@ pub async fn begin(
     let mut counts = vec![own];
     if let Some(user) = origin.known {
         // Somebody who has the cookie of such a browser gets no more guesses than somebody with many networks.
-        counts.push(Count { name: name.clone(), source: format!("{ALL_NETWORKS} {user}"), limit: EVERYWHERE });
+        counts.push(Count { name: name.clone(), source: format!("{ALL_NETWORKS} {user}"), limit: ALL_NETWORKS_LIMIT });
     } else {
         counts.extend(origin.site.clone().map(|site| Count { name: name.clone(), source: site, limit: SITE }));
-        counts.push(Count { name: name.clone(), source: ALL_NETWORKS.to_owned(), limit: EVERYWHERE });
+        counts.push(Count { name: name.clone(), source: ALL_NETWORKS.to_owned(), limit: ALL_NETWORKS_LIMIT });
     }
     let mut wait = 0.0_f64;
     for count in &counts {
@@ -216,7 +216,7 @@ mod tests {
         let waits = |limit: Limit, from: u32| [0, 1, 2, 3, 4].map(|more| limit.wait_after(from + more).as_secs());
         assert_eq!(waits(NETWORK, 3), [0, 2, 4, 8, 16]);
         assert_eq!(waits(SITE, 6), [0, 2, 4, 8, 16]);
-        assert_eq!(waits(EVERYWHERE, 50), [0, 2, 4, 8, 10]);
+        assert_eq!(waits(ALL_NETWORKS_LIMIT, 50), [0, 2, 4, 8, 10]);
         assert_eq!(NETWORK.wait_after(u32::MAX), Duration::from_mins(15));
     }
 

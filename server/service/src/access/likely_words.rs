@@ -2,7 +2,7 @@
 //! estimator: of gait laboratories, and the most common ones of four languages.
 
 /// The words, in lower case.
-pub(super) const LIKELY: &[&str] = &[
+pub(super) const LIKELY_WORDS: &[&str] = &[
     // the service and its users
     "gaitwright",
     "gait",

@@ -3,18 +3,18 @@
 //! As NIST SP 800-63B-4 recommends for a password that is the only factor, the policy asks for length and refuses
 //! predictable passwords; it does not ask for kinds of characters.
 
-use super::likely_words::LIKELY;
+use super::likely_words::LIKELY_WORDS;
 use crate::error::{Error, FieldError};
 use zxcvbn::zxcvbn;
 
 /// Minimum length, characters.
-pub const SHORTEST: usize = 15;
+pub const MIN_LENGTH: usize = 15;
 /// Maximum length, bytes.
-const LONGEST_BYTES: usize = 1000;
+const MAX_BYTES: usize = 1000;
 
 /// Minimum estimated number of guesses, as a power of ten. Four predictable parts, such as two common words, a year and
 /// an exclamation mark, have about 12; random passwords of the minimum length have 15.
-const FEWEST_GUESSES: f64 = 12.5;
+const MIN_GUESSES: f64 = 12.5;
 
 /// Refuses a password that is too short, too long, or predictable for somebody who knows the name of the user.
 ///
@@ -22,13 +22,13 @@ const FEWEST_GUESSES: f64 = 12.5;
 /// [`Error::Invalid`], which does not contain the password.
 pub fn check(password: &str, name: &str) -> Result<(), Error> {
     let length = password.chars().count();
-    if length < SHORTEST || password.len() > LONGEST_BYTES {
-        let allowed = format!("at least {SHORTEST} characters and at most {LONGEST_BYTES} bytes long");
+    if length < MIN_LENGTH || password.len() > MAX_BYTES {
+        let allowed = format!("at least {MIN_LENGTH} characters and at most {MAX_BYTES} bytes long");
         let characters = if length == 1 { "character" } else { "characters" };
         return Err(FieldError::described("password", &format!("{length} {characters} long"), &allowed).into());
     }
-    let known: Vec<&str> = name.split_whitespace().chain([name]).chain(LIKELY.iter().copied()).collect();
-    if zxcvbn(password, &known).guesses_log10() < FEWEST_GUESSES {
+    let known: Vec<&str> = name.split_whitespace().chain([name]).chain(LIKELY_WORDS.iter().copied()).collect();
+    if zxcvbn(password, &known).guesses_log10() < MIN_GUESSES {
         let message = "The new password is too easy to guess. Use, for example, four unrelated words. Names, common words \
                        in any language, well-known phrases, keyboard rows, dates, sequences such as 1234 and \
                        repetitions add little strength.";

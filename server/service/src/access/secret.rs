@@ -27,7 +27,7 @@ pub fn hash(secret: &str) -> String {
 }
 
 /// Limits parallel password hashes, each of which takes a core and 19 MiB.
-static AT_ONCE: Semaphore = Semaphore::const_new(2);
+static PARALLEL_HASHES: Semaphore = Semaphore::const_new(2);
 
 /// Queues of password checks, one for each network, so that many attempts from one network do not delay others.
 #[derive(Debug, Default)]
@@ -68,7 +68,7 @@ impl PasswordCheckQueues {
 /// If the work panics.
 pub async fn on_blocking_thread<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Error> {
     let failed = |reason: String| Error::Internal(format!("password hashing failed: {reason}"));
-    let turn = AT_ONCE.acquire().await.map_err(|e| failed(e.to_string()))?;
+    let turn = PARALLEL_HASHES.acquire().await.map_err(|e| failed(e.to_string()))?;
     // The permit ends with the work, even if the caller disconnects earlier.
     let work = move || {
         let _turn = turn;

@@ -10,7 +10,7 @@ use gaitwright_store::{Connection, Instant, SessionId, UserId, Writer, sessions,
 use serde_json::json;
 
 /// The least time between two writes of a session's last activity.
-const SEEN_EVERY_SECONDS: f64 = 60.0;
+const ACTIVITY_INTERVAL_S: f64 = 60.0;
 
 /// When sessions expire.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,7 +101,7 @@ pub async fn of_session(
     if user.disabled_at.is_some() {
         return Ok(SignInLookup::Nobody);
     }
-    let due = now.seconds_since(found.seen_at) > SEEN_EVERY_SECONDS.min(limits.idle_seconds / 4.0);
+    let due = now.seconds_since(found.seen_at) > ACTIVITY_INTERVAL_S.min(limits.idle_seconds / 4.0);
     Ok(SignInLookup::Known { caller: Caller::person(user.id, &user.name, user.role), seen: due.then_some(found.id) })
 }
 

@@ -13,7 +13,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Maximum validity of a token, days.
-const LONGEST_DAYS: u32 = 3660;
+const MAX_DAYS: u32 = 3660;
 
 /// A token to create.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
@@ -41,8 +41,8 @@ pub async fn make(writer: &mut Writer, actor: &Actor, new: &NewToken) -> Result<
         let allowed = "one or more of read, run, answer, rate, device";
         return Err(Error::invalid("scopes", json!(new.scopes), allowed));
     }
-    if new.days.is_some_and(|days| !(1..=LONGEST_DAYS).contains(&days)) {
-        return Err(Error::invalid("days", json!(new.days), &format!("1 to {LONGEST_DAYS}, or absent")));
+    if new.days.is_some_and(|days| !(1..=MAX_DAYS).contains(&days)) {
+        return Err(Error::invalid("days", json!(new.days), &format!("1 to {MAX_DAYS}, or absent")));
     }
     let secret = format!("gait_{}", secret::fresh()?);
     let now = monotonic_clock::recorded(writer).await?;

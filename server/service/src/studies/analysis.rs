@@ -13,25 +13,25 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// From this number of trials on, requests do not wait for the posterior.
-pub const MANY: usize = 400;
+pub const MAX_TRIALS_TO_WAIT_FOR: usize = 400;
 /// Above this number of entries of the feedback log, requests do not wait for the posterior.
-pub const MOST_ANSWERS: usize = 1500;
+pub const MAX_ANSWERS: usize = 1500;
 
 /// Why no request waits for the posterior of a study with so many trials and entries of the feedback log: its computing
 /// time grows with their third power. `None` if requests wait.
 pub fn too_large_to_wait(trials: usize, answers: usize) -> Option<String> {
-    if trials >= MANY {
-        return Some(format!("{MANY} trials or more"));
+    if trials >= MAX_TRIALS_TO_WAIT_FOR {
+        return Some(format!("{MAX_TRIALS_TO_WAIT_FOR} trials or more"));
     }
-    (answers > MOST_ANSWERS).then(|| format!("more than {MOST_ANSWERS} labels and answers"))
+    (answers > MAX_ANSWERS).then(|| format!("more than {MAX_ANSWERS} labels and answers"))
 }
 
 /// Number of studies whose results are cached.
-const KEPT: usize = 16;
+const CACHED_STUDIES: usize = 16;
 /// Number of studies whose learner is cached, so that a proposal and the pages share one fit.
 const KEPT_LEARNERS: usize = 4;
 /// The learner of a study with more trials is not cached: its memory grows with the square, here to about 100 MB.
-const MOST_KEPT_TRIALS: usize = 2000;
+const MAX_KEPT_TRIALS: usize = 2000;
 
 /// The posterior after a log, with everything that pages and REST show of it.
 #[derive(Debug)]
@@ -135,7 +135,7 @@ impl Analyses {
             self.computed.fetch_add(1, Ordering::Relaxed);
             learner.posterior(&plan.search_space, &snapshot.log(), &plan.learner)
         });
-        if snapshot.trials.len() > MOST_KEPT_TRIALS {
+        if snapshot.trials.len() > MAX_KEPT_TRIALS {
             *learner = Learner::default();
         }
         posterior
@@ -166,7 +166,7 @@ impl Analyses {
     /// # Errors
     /// When the learner cannot work with the log.
     pub fn utility_history(&self, _: &OnPool, snapshot: &StudySnapshot) -> Result<Vec<UtilityPoint>, LearnerError> {
-        let history = kept_or_new(&self.histories, snapshot.study.id, KEPT);
+        let history = kept_or_new(&self.histories, snapshot.study.id, CACHED_STUDIES);
         let mut history = history.lock().unwrap_or_else(|poisoned| {
             let mut history = poisoned.into_inner();
             *history = UtilityHistory::default();
@@ -214,7 +214,7 @@ impl<V: Copy + PartialEq, T> StudyCache<V, T> {
         let mut kept = kept();
         kept.retain(|(id, ..)| *id != study);
         kept.push_back((study, version, Arc::clone(&computed)));
-        if kept.len() > KEPT {
+        if kept.len() > CACHED_STUDIES {
             kept.pop_front();
         }
         Ok(computed)

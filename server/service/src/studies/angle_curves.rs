@@ -7,7 +7,7 @@ use crate::error::Error;
 use gait_optimizer::angle_table::{AngleColumn, AngleTable};
 use gait_optimizer::limit_cycle::JOINTS;
 use gait_optimizer::reference::{
-    AngleUnit, HeelStrikes, LARGEST_ANGLE_RAD, MotionRecording, doubtful_curve, doubtful_range, mean_cycle,
+    AngleUnit, HeelStrikes, MAX_ANGLE_RAD, MotionRecording, doubtful_curve, doubtful_range, mean_cycle,
 };
 use std::f64::consts::PI;
 
@@ -87,7 +87,7 @@ impl ColumnChoice {
 
 /// Degrees if an angle would be implausible in radians.
 fn unit_by_size(file: &AngleTable, chosen: &ChosenColumns) -> AngleUnit {
-    let is_large = |value: &f64| value.abs() > LARGEST_ANGLE_RAD;
+    let is_large = |value: &f64| value.abs() > MAX_ANGLE_RAD;
     let mut values = chosen.values().filter_map(|chosen| file.values(&chosen.column));
     if values.any(|values| values.iter().any(is_large)) { AngleUnit::Degrees } else { AngleUnit::Radians }
 }

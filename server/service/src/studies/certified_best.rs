@@ -14,7 +14,7 @@ use std::sync::Arc;
 use utoipa::ToSchema;
 
 /// The most gaits that are certified in search of one that passes.
-pub const MOST_CERTIFIED: usize = 10;
+pub const MAX_CERTIFIED: usize = 10;
 
 /// State of the certificate of a gait: `passed`, every checked value is within its limit, the walker does not fall and
 /// the gait is stable; `failed`, the certificate did not pass; `being_certified`, the gait is being certified;
@@ -54,7 +54,7 @@ pub struct BestCertification {
     pub failures: Vec<String>,
     /// If the best gait failed, the best one that passed.
     pub passing: Option<TrialId>,
-    /// The best gait without a certificate among the first [`MOST_CERTIFIED`], unless a better one passed.
+    /// The best gait without a certificate among the first [`MAX_CERTIFIED`], unless a better one passed.
     pub without_certificate: Option<TrialId>,
     /// Whether the service is certifying that gait.
     pub certifying: bool,
@@ -91,7 +91,7 @@ pub async fn of_ranking(db: &mut Connection, ranking: &[TrialId]) -> StoreResult
                 break;
             }
             CertificateState::Failed => {}
-            _ if place < MOST_CERTIFIED && gaits::exists(db, trial).await? => {
+            _ if place < MAX_CERTIFIED && gaits::exists(db, trial).await? => {
                 certification.without_certificate.get_or_insert(trial);
             }
             _ => {}
@@ -103,7 +103,7 @@ pub async fn of_ranking(db: &mut Connection, ranking: &[TrialId]) -> StoreResult
     Ok(certification)
 }
 
-/// The next gait to certify. `None` if one has passed, or if the first [`MOST_CERTIFIED`] failed. Skips the gaits in
+/// The next gait to certify. `None` if one has passed, or if the first [`MAX_CERTIFIED`] failed. Skips the gaits in
 /// `refused`, which cannot be certified.
 ///
 /// # Errors
@@ -113,7 +113,7 @@ pub async fn next_to_certify(
     ranking: &[TrialId],
     refused: &BTreeSet<TrialId>,
 ) -> StoreResult<Option<TrialId>> {
-    for &trial in ranking.iter().take(MOST_CERTIFIED) {
+    for &trial in ranking.iter().take(MAX_CERTIFIED) {
         match certificates::passed(db, trial).await? {
             Some(true) => return Ok(None),
             None if !refused.contains(&trial) && gaits::exists(db, trial).await? => return Ok(Some(trial)),
@@ -132,7 +132,7 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
     let mut kept = Vec::new();
     for (place, &trial) in ranking.iter().enumerate() {
         let passed = certificates::passed(db, trial).await?;
-        if place == 0 || passed == Some(true) || (passed.is_none() && place < MOST_CERTIFIED) {
+        if place == 0 || passed == Some(true) || (passed.is_none() && place < MAX_CERTIFIED) {
             kept.push(trial);
         }
         if passed == Some(true) {
@@ -142,7 +142,7 @@ pub async fn worth_keeping(db: &mut Connection, ranking: &[TrialId]) -> StoreRes
     Ok(kept)
 }
 
-/// Certifies the gaits of a study, best first, until one passes or [`MOST_CERTIFIED`] have failed.
+/// Certifies the gaits of a study, best first, until one passes or [`MAX_CERTIFIED`] have failed.
 ///
 /// A malformed gait, as another worker may have sent it, stays without a certificate.
 ///

@@ -1,6 +1,6 @@
 //! The execution report of one trial's gait: what it is of, its state, and its storage.
 
-use super::seed::LARGEST_SEED;
+use super::seed::MAX_SEED;
 use super::trial_transitions::has_state;
 use crate::error::Error;
 use gait_optimizer::Gait;
@@ -17,7 +17,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Largest number of simulated walks on a ground: some minutes of processor time.
-pub const MOST_SIMULATED_WALKS: u32 = 1000;
+pub const MAX_SIMULATED_WALKS: u32 = 1000;
 
 /// A request to simulate walks. There are three kinds of ground: level, and uneven by ±5 mm or ±10 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -45,15 +45,15 @@ impl NewExecutionReport {
     /// [`Error::Invalid`] naming the field.
     pub fn options(self) -> Result<ExecutionOptions, Error> {
         let Self { number_of_simulated_walks, seed } = self;
-        if !(1..=MOST_SIMULATED_WALKS).contains(&number_of_simulated_walks) {
+        if !(1..=MAX_SIMULATED_WALKS).contains(&number_of_simulated_walks) {
             return Err(Error::invalid(
                 "number_of_simulated_walks",
                 number_of_simulated_walks,
-                &format!("1 to {MOST_SIMULATED_WALKS}"),
+                &format!("1 to {MAX_SIMULATED_WALKS}"),
             ));
         }
-        if seed > LARGEST_SEED {
-            return Err(Error::invalid("seed", seed, &format!("0 to {LARGEST_SEED}")));
+        if seed > MAX_SEED {
+            return Err(Error::invalid("seed", seed, &format!("0 to {MAX_SEED}")));
         }
         Ok(ExecutionOptions { number_of_simulated_walks, seed, ..ExecutionOptions::default() })
     }

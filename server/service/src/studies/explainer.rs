@@ -7,7 +7,7 @@ use super::trial_jobs::{TrialJob, run_cancellable};
 use crate::error::Error;
 use crate::workers::Explain;
 use gait_optimizer::CancelToken;
-use gaitwright_compute::priority::AFTERWARDS;
+use gaitwright_compute::priority::BACKGROUND_NICENESS;
 use gaitwright_store::accessible_studies::Reach;
 use gaitwright_store::{Store, StoreResult, StudyId, TrialId, cancelled_jobs, commit, events, explanations, trials};
 use serde_json::json;
@@ -29,11 +29,11 @@ struct Durations(VecDeque<u64>);
 
 impl Durations {
     /// The expected duration is the median of at most this many durations.
-    const KEPT: usize = 9;
+    const MAX_DURATIONS: usize = 9;
 
     /// Records the duration of an explanation, s.
     fn add(&mut self, seconds: u64) {
-        if self.0.len() == Self::KEPT {
+        if self.0.len() == Self::MAX_DURATIONS {
             self.0.pop_front();
         }
         self.0.push_back(seconds);
@@ -94,7 +94,7 @@ impl TrialJob for Explainer {
         let (solve, problem) = store.compute(move |pool| packed.unpack(pool)).await??;
         let explain = Arc::clone(&self.explain);
         let work = move |cancel: &CancelToken| explain.explain(&solve, cancel);
-        let Some(found) = run_cancellable(("explainer", AFTERWARDS), &cancelled, work).await?? else {
+        let Some(found) = run_cancellable(("explainer", BACKGROUND_NICENESS), &cancelled, work).await?? else {
             let nothing = || Error::Internal("the explanation ended without a result".to_owned());
             return if cancelled.is_cancelled() { Ok(()) } else { Err(nothing()) };
         };
@@ -125,6 +125,6 @@ mod tests {
         for seconds in [1000, 1000, 1000, 10, 11, 12, 13, 14, 90, 95, 5, 6] {
             durations.add(seconds);
         }
-        assert_eq!((durations.0.len(), durations.median()), (Durations::KEPT, Some(12)));
+        assert_eq!((durations.0.len(), durations.median()), (Durations::MAX_DURATIONS, Some(12)));
     }
 }

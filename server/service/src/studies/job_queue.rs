@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// How long a job that failed because of the machine, for example a full disk, waits until it is tried again.
-const RETRY: Duration = Duration::from_mins(1);
+const RETRY_PAUSE: Duration = Duration::from_mins(1);
 
 /// Which request is next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -191,7 +191,7 @@ impl<R: Clone> JobQueue<R> {
         self.end();
         if !self.cancelled.contains(&trial) && self.admits(trial) {
             self.requested.push((trial, request));
-            self.postponed.insert(trial, Instant::now() + RETRY);
+            self.postponed.insert(trial, Instant::now() + RETRY_PAUSE);
         }
     }
 

@@ -7,7 +7,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, TrialId, gaits, trials};
 
 /// So many gaits can be laid over that of a trial: more lines in a chart cannot be told apart.
-pub const MOST_OTHERS: usize = 3;
+pub const MAX_OTHERS: usize = 3;
 
 /// The other trials whose gaits are laid over that of `trial`; `field` names them.
 ///
@@ -15,8 +15,8 @@ pub const MOST_OTHERS: usize = 3;
 /// [`Error::Invalid`] for too many trials, for a trial of another study, without a converged gait or without its
 /// trajectory, and for two trials with the same gait.
 pub async fn others(db: &mut Connection, trial: &Trial, field: &str, ids: &[TrialId]) -> Result<Vec<Trial>, Error> {
-    if ids.len() > MOST_OTHERS {
-        let message = format!("At most {MOST_OTHERS} other gaits can be laid over a gait; {} are chosen.", ids.len());
+    if ids.len() > MAX_OTHERS {
+        let message = format!("At most {MAX_OTHERS} other gaits can be laid over a gait; {} are chosen.", ids.len());
         return Err(FieldError::in_words(field, &message).into());
     }
     let mut others: Vec<Trial> = Vec::new();

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tokio::task::{Id, JoinSet};
 
 /// How long jobs of other studies wait for a plan.
-const PATIENCE: Duration = Duration::from_secs(1);
+const PLAN_WAIT: Duration = Duration::from_secs(1);
 
 /// The result of a planning task: the snapshot of the study if it waits for an answer.
 type Planned = Result<Option<StudySnapshot>, Error>;
@@ -61,10 +61,10 @@ impl Plans {
     }
 
     /// When to dispatch jobs that have been queued since `since`. Dispatch waits for tasks in progress, so that a study
-    /// with a higher priority comes first even if its planning takes longer, but at most for [`PATIENCE`].
+    /// with a higher priority comes first even if its planning takes longer, but at most for [`PLAN_WAIT`].
     pub(super) fn dispatch_at(&self, since: Instant) -> Instant {
-        let newest = self.under_way.values().map(|(_, begun)| *begun + PATIENCE).max();
-        newest.map_or(since, |patient| patient.min(since + PATIENCE))
+        let newest = self.under_way.values().map(|(_, begun)| *begun + PLAN_WAIT).max();
+        newest.map_or(since, |patient| patient.min(since + PLAN_WAIT))
     }
 
     /// The snapshots of the studies that wait for an answer.

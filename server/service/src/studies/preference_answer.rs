@@ -128,7 +128,7 @@ pub fn attribution<'a>(
 }
 
 /// The most answers of other people that a comparison lists.
-const BESIDE: u32 = 20;
+const MAX_OTHER_ANSWERS: u32 = 20;
 
 /// The newest answers of other people to the same comparison. The learner uses all of them.
 ///
@@ -139,7 +139,7 @@ pub async fn other_answers(db: &mut Connection, row: &FeedbackRow) -> Result<Vec
     else {
         return Ok(Vec::new());
     };
-    Ok(feedback::of_pair(db, (a, b), Some(&row.author), BESIDE).await?)
+    Ok(feedback::of_pair(db, (a, b), Some(&row.author), MAX_OTHER_ANSWERS).await?)
 }
 
 /// Retracts a preference.

@@ -14,7 +14,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Maximum length of a name, characters.
-const LONGEST_NAME: usize = 200;
+const MAX_NAME: usize = 200;
 /// Column of the vertical force under the right foot in OpenSim's examples.
 const FORCE_COLUMN: &str = "ground_force_vy";
 /// Column of the vertical force under the right foot in the `fp` tables of Camargo 2021.
@@ -23,7 +23,7 @@ const CAMARGO_FORCE_COLUMN: &str = "Treadmill_R_vy";
 pub(super) const RECORDING: &str = "recording";
 pub(super) const FORCES: &str = "forces";
 /// Maximum length of the provenance, which includes the comments of the recording.
-const LONGEST_PROVENANCE_BYTES: usize = 20_000;
+const MAX_PROVENANCE_BYTES: usize = 20_000;
 
 /// File format of a recording of joint angles: `opensim`, a motion or storage file (.mot, .sto) of a gait model;
 /// `camargo`, the `data` table of an `ik` file from the Camargo 2021 data set, as CSV; `csv`, a CSV file as
@@ -142,7 +142,7 @@ impl NewReferenceGait {
     /// [`Error::Invalid`] naming the field.
     pub fn check_person(&self, is_preview: bool) -> Result<(), Error> {
         if !is_preview {
-            printable::name("name", &self.name, LONGEST_NAME)?;
+            printable::name("name", &self.name, MAX_NAME)?;
         }
         Ok(self.walker().validate()?)
     }
@@ -213,10 +213,10 @@ impl NewReferenceGait {
 
     /// Cuts a recording at heel strikes and averages the strides.
     pub(super) fn definition_of(&self, recording: &MotionRecording) -> Result<Definition, Error> {
-        let name = printable::name("name", &self.name, LONGEST_NAME)?;
+        let name = printable::name("name", &self.name, MAX_NAME)?;
         let definition = recording.reference(name, &self.heel_strikes(), self.walker())?;
-        if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
-            let allowed = format!("a file with at most {LONGEST_PROVENANCE_BYTES} bytes of comments above its columns");
+        if definition.provenance.len() > MAX_PROVENANCE_BYTES {
+            let allowed = format!("a file with at most {MAX_PROVENANCE_BYTES} bytes of comments above its columns");
             let given = format!("a file with {} bytes of comments", definition.provenance.len());
             return Err(FieldError::described("recording", &given, &allowed).into());
         }
@@ -237,9 +237,9 @@ impl NewReferenceGait {
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check(definition: &Definition) -> Result<(), Error> {
-    printable::name("name", &definition.name, LONGEST_NAME)?;
-    if definition.provenance.len() > LONGEST_PROVENANCE_BYTES {
-        let allowed = format!("at most {LONGEST_PROVENANCE_BYTES} bytes long");
+    printable::name("name", &definition.name, MAX_NAME)?;
+    if definition.provenance.len() > MAX_PROVENANCE_BYTES {
+        let allowed = format!("at most {MAX_PROVENANCE_BYTES} bytes long");
         let given = format!("{} bytes long", definition.provenance.len());
         return Err(FieldError::described("provenance", &given, &allowed).into());
     }

@@ -4,7 +4,7 @@
 use sha2::{Digest, Sha256};
 
 /// The largest seed: many JSON readers keep only 53 bits of an integer.
-pub const LARGEST_SEED: u64 = (1 << 53) - 1;
+pub const MAX_SEED: u64 = (1 << 53) - 1;
 
 /// The purpose of a draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use gaitwright_store::{Connection, Packed, gaits, studies};
 
 /// Largest number of mesh intervals, over the four kinds of domain, of a gait whose sensitivities a request computes:
 /// their time grows with the number of intervals, and stays below a second here.
-const MOST_INTERVALS: usize = 80;
+const MAX_INTERVALS: usize = 80;
 
 /// The solution of a trial, still compressed.
 #[derive(Debug)]
@@ -68,9 +68,9 @@ pub async fn solution(db: &mut Connection, trial: &Trial) -> Result<PackedSoluti
     let plan = studies::get(db, trial.study_id).await?.plan;
     let mesh = plan.gait_settings.mesh;
     let intervals = mesh.ds2 + mesh.ds3 + mesh.ss2 + mesh.ss1;
-    if intervals > MOST_INTERVALS {
+    if intervals > MAX_INTERVALS {
         return Err(Error::conflict(format!(
-            "The mesh of trial {number} has {intervals} intervals. The service computes sensitivities for at most {MOST_INTERVALS} intervals; \
+            "The mesh of trial {number} has {intervals} intervals. The service computes sensitivities for at most {MAX_INTERVALS} intervals; \
              for a finer mesh, download the problem file of the trial and run `gaitwright solve --problem problem.json --sensitivities`."
         )));
     }

@@ -1,6 +1,6 @@
 //! What simulated walks decide in a study: the label of a gait, and comparisons of gaits with nearly the same Gait RMSE.
 
-use super::execution::{MOST_SIMULATED_WALKS, NewExecutionReport};
+use super::execution::{MAX_SIMULATED_WALKS, NewExecutionReport};
 use crate::error::Error;
 use gait_optimizer::execution::ExecutionOptions;
 use gaitwright_store::studies::{AnswerSource, Evaluation, SimulatedWalks, SimulatedWalksEffect, StudyPlan};
@@ -14,9 +14,9 @@ use serde_json::json;
 pub(super) fn check(plan: &StudyPlan) -> Result<(), Error> {
     let SimulatedWalks { effect, number_of_simulated_walks, gait_rmse_tolerance_rad, least_mean_strides } =
         plan.simulated_walks;
-    if !(1..=MOST_SIMULATED_WALKS).contains(&number_of_simulated_walks) {
+    if !(1..=MAX_SIMULATED_WALKS).contains(&number_of_simulated_walks) {
         let field = "simulated_walks.number_of_simulated_walks";
-        return Err(Error::invalid(field, number_of_simulated_walks, &format!("1 to {MOST_SIMULATED_WALKS}")));
+        return Err(Error::invalid(field, number_of_simulated_walks, &format!("1 to {MAX_SIMULATED_WALKS}")));
     }
     if !(0.0..=10.0).contains(&gait_rmse_tolerance_rad) {
         let field = "simulated_walks.gait_rmse_tolerance_rad";

@@ -11,7 +11,7 @@ use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studi
 use std::collections::{HashMap, HashSet};
 
 /// How often a decision is repeated because the study has changed in the meantime.
-pub const MOST_TRIES: usize = 20;
+pub const MAX_TRIES: usize = 20;
 
 /// Refuses a decision because the study has changed in the meantime.
 pub fn has_changed() -> Error {

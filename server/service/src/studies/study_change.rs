@@ -43,7 +43,7 @@ pub struct StudyChange {
 }
 
 /// Maximum length of notes, characters.
-const LONGEST_NOTES: usize = 4000;
+const MAX_NOTES: usize = 4000;
 
 /// Checks tags and notes of an imported study.
 ///
@@ -51,7 +51,7 @@ const LONGEST_NOTES: usize = 4000;
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_filing(study: &Study) -> Result<(), Error> {
     checked_tags(&study.tags)?;
-    printable::note("notes", &study.notes, LONGEST_NOTES)?;
+    printable::note("notes", &study.notes, MAX_NOTES)?;
     Ok(())
 }
 
@@ -93,7 +93,7 @@ async fn checked(db: &mut Connection, reach: Reach, id: StudyId, change: &StudyC
     let notes = match change.notes.as_deref().map(str::trim) {
         None => study.notes.clone(),
         Some(notes) => {
-            printable::note("notes", notes, LONGEST_NOTES)?;
+            printable::note("notes", notes, MAX_NOTES)?;
             notes.to_owned()
         }
     };

@@ -13,7 +13,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Largest number of trials of a study.
-const MOST_TRIALS: i64 = 10_000;
+const MAX_TRIALS: i64 = 10_000;
 
 /// A larger number of trials.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
@@ -31,13 +31,11 @@ pub struct StudyExtension {
 pub async fn extend(writer: &mut Writer, actor: &Actor, id: StudyId, more: &StudyExtension) -> Result<Study, Error> {
     let study = studies::get(writer, id).await?;
     let least = i64::from(study.plan.number_of_trials) + 1;
-    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least.min(MOST_TRIALS), MOST_TRIALS)?;
-    if least > MOST_TRIALS {
-        return Err(Error::conflict(format!(
-            "The study has {MOST_TRIALS} trials already, the largest number allowed."
-        )));
+    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least.min(MAX_TRIALS), MAX_TRIALS)?;
+    if least > MAX_TRIALS {
+        return Err(Error::conflict(format!("The study has {MAX_TRIALS} trials already, the largest number allowed.")));
     }
-    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, MOST_TRIALS)?;
+    study_plan::check_range("number_of_trials", i64::from(more.number_of_trials), least, MAX_TRIALS)?;
     let state = match study.state {
         ended @ (StudyState::Finished | StudyState::Stopped) => lifecycle::after(ended, StudyTransition::Extend)?,
         other => other,
@@ -57,7 +55,7 @@ pub(super) async fn raise_number_of_trials(
     number_of_trials: u32,
     state: StudyState,
 ) -> Result<(), Error> {
-    study_plan::check_range("number_of_trials", i64::from(number_of_trials), 1, MOST_TRIALS)?;
+    study_plan::check_range("number_of_trials", i64::from(number_of_trials), 1, MAX_TRIALS)?;
     let limits = StudyLimits {
         name: study.plan.name.clone(),
         priority: study.plan.priority,

@@ -8,7 +8,7 @@ use gaitwright_store::{Connection, StudyId, studies};
 use std::collections::BTreeSet;
 
 /// Maximum length of a name, characters.
-pub(super) const LONGEST: usize = 120;
+pub(super) const MAX_LENGTH: usize = 120;
 
 /// The compared names of all studies in reach except this one.
 async fn taken(db: &mut Connection, reach: Reach, except: Option<StudyId>) -> Result<BTreeSet<String>, Error> {
@@ -35,7 +35,7 @@ fn free_of(taken: &BTreeSet<String>, name: &str) -> String {
 
 /// A name with a mark at its end, shortened if it would be too long.
 pub(super) fn marked(name: &str, mark: &str) -> String {
-    let kept: String = name.chars().take(LONGEST - mark.len()).collect();
+    let kept: String = name.chars().take(MAX_LENGTH - mark.len()).collect();
     format!("{}{mark}", kept.trim_end())
 }
 
@@ -49,7 +49,7 @@ pub(super) async fn checked(
     name: &str,
     study: Option<StudyId>,
 ) -> Result<String, Error> {
-    let name = printable::name("name", name.trim(), LONGEST)?;
+    let name = printable::name("name", name.trim(), MAX_LENGTH)?;
     let taken = taken(db, reach, study).await?;
     let free = free_of(&taken, name);
     if free == name {
@@ -72,7 +72,7 @@ mod tests {
         assert_eq!(free_of(&taken, "sample  STUDY"), "sample  STUDY (2)");
         assert_eq!(free_of(&taken, "étude"), "étude");
         assert_eq!(free_of(&taken, "étude (2)"), "étude (2) (2)");
-        let long = "x".repeat(LONGEST);
-        assert_eq!(free_of(&[long.clone()].into(), &long).chars().count(), LONGEST);
+        let long = "x".repeat(MAX_LENGTH);
+        assert_eq!(free_of(&[long.clone()].into(), &long).chars().count(), MAX_LENGTH);
     }
 }

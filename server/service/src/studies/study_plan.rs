@@ -1,7 +1,7 @@
 //! Checks and creates a study, for pages, REST and the command line.
 
 use super::bound_grid::{self, RequestedSearchSpace};
-use super::seed::LARGEST_SEED;
+use super::seed::MAX_SEED;
 use super::simulated_walks_setting::SimulatedWalksSetting;
 use super::subject::{self, NewSubject};
 use super::{built_in_entries, membership, simulated_walks, study_name, study_plan_schemas};
@@ -331,7 +331,7 @@ async fn check_for(
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
-    printable::name("name", &plan.name, study_name::LONGEST)?;
+    printable::name("name", &plan.name, study_name::MAX_LENGTH)?;
     check_range("number_of_trials", i64::from(plan.number_of_trials), 1, 10_000)?;
     check_range("parallel_trials", i64::from(plan.parallel_trials), 1, 64)?;
     check_range("priority", i64::from(plan.priority), -10, 10)?;
@@ -341,8 +341,8 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
     if let Some(limit) = plan.unchanged_limit {
         check_range("unchanged_limit", i64::from(limit), 1, 10_000)?;
     }
-    if plan.seed > LARGEST_SEED {
-        return Err(Error::invalid("seed", plan.seed, &format!("0 to {LARGEST_SEED}")));
+    if plan.seed > MAX_SEED {
+        return Err(Error::invalid("seed", plan.seed, &format!("0 to {MAX_SEED}")));
     }
     simulated_walks::check(plan)?;
     let within = |part: &'static str| move |error: ModelError| FieldError::from(error).within(part);

@@ -145,8 +145,8 @@ pub async fn set_muscles(
 /// Whether a character is visible and unambiguous. Control characters, joiners, direction overrides and blank letters
 /// could make two pseudonyms look alike.
 fn is_visible(c: char) -> bool {
-    const SHAPELESS: [char; 4] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}'];
-    (c.is_alphanumeric() && !SHAPELESS.contains(&c)) || " -_.:/#+()".contains(c)
+    const INVISIBLE_LETTERS: [char; 4] = ['\u{115f}', '\u{1160}', '\u{3164}', '\u{ffa0}'];
+    (c.is_alphanumeric() && !INVISIBLE_LETTERS.contains(&c)) || " -_.:/#+()".contains(c)
 }
 
 /// Refuses a pseudonym that may be an e-mail address, a number of a person or a date of birth.

@@ -4,15 +4,15 @@ use crate::error::{Error, FieldError};
 use crate::printable;
 
 /// Largest number of tags of a study, and of characters of a tag.
-const MOST_TAGS: usize = 10;
-const LONGEST_TAG: usize = 40;
+const MAX_TAGS: usize = 10;
+const MAX_TAG: usize = 40;
 
 /// Checks tags: trimmed, without repetitions, in alphabetical order.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the field.
 pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
-    if tags.len() > MOST_TAGS {
+    if tags.len() > MAX_TAGS {
         return Err(FieldError::described(
             "tags",
             &format!("a list of {} tags", tags.len()),
@@ -22,7 +22,7 @@ pub(super) fn checked_tags(tags: &[String]) -> Result<Vec<String>, Error> {
     }
     let mut checked = Vec::new();
     for tag in tags {
-        let tag = printable::name("tags", tag, LONGEST_TAG)?;
+        let tag = printable::name("tags", tag, MAX_TAG)?;
         if tag.contains(',') {
             return Err(Error::invalid("tags", tag, "a tag without commas, because commas separate tags"));
         }

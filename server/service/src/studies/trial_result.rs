@@ -22,7 +22,7 @@ use gaitwright_store::{Store, TrialId, attempts, commit, gaits, solve_inputs, so
 use std::time::Duration;
 
 /// How often a result is compared again because the study received an answer in the meantime.
-const TRIES: u32 = 20;
+const MAX_ATTEMPTS: u32 = 20;
 /// The pause after the first attempt; it grows by this much after each.
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
 
@@ -70,7 +70,7 @@ pub async fn ended(
         violations: outcome.violations.clone(),
         message: String::new(),
     };
-    for attempt in 0..TRIES {
+    for attempt in 0..MAX_ATTEMPTS {
         tokio::time::sleep(FIRST_PAUSE * attempt).await;
         let mut reader = store.read().await?;
         let study = studies::get(&mut reader, lease.study).await?;

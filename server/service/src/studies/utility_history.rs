@@ -9,10 +9,10 @@ use gaitwright_store::{FeedbackId, TrialId};
 use std::collections::{HashMap, HashSet};
 
 /// Largest number of points: each one costs a fit of all answers before it.
-const MOST_POINTS: usize = 64;
+const MAX_POINTS: usize = 64;
 /// Largest number of entries with which all these fits together take well below a second. A longer log has fewer points in
 /// proportion, because a request waits for them.
-const MOST_ENTRIES_OF_ALL_POINTS: usize = 200;
+const MAX_ENTRIES_OF_ALL_POINTS: usize = 200;
 
 /// The recommended gait after a number of answers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,7 +95,7 @@ fn prefixes(rows: &[&FeedbackRow]) -> Vec<(u32, usize)> {
 
 /// Every how many answers there is a point.
 fn stride(answers: usize, entries: usize) -> usize {
-    let points = MOST_POINTS * MOST_ENTRIES_OF_ALL_POINTS / entries.max(MOST_ENTRIES_OF_ALL_POINTS);
+    let points = MAX_POINTS * MAX_ENTRIES_OF_ALL_POINTS / entries.max(MAX_ENTRIES_OF_ALL_POINTS);
     let mut stride = 1;
     while answers / stride > points {
         stride *= 2;

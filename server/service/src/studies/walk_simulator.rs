@@ -5,7 +5,7 @@ use super::job_queue::TrialJobState;
 use super::trial_jobs::{TrialJob, run_cancellable};
 use crate::error::Error;
 use gait_optimizer::execution::simulate;
-use gaitwright_compute::priority::AFTERWARDS;
+use gaitwright_compute::priority::BACKGROUND_NICENESS;
 use gaitwright_store::{Store, StoreResult, TrialId, cancelled_jobs, execution_reports};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -67,7 +67,7 @@ impl TrialJob for WalkSimulator {
         let gait = execution::gait_of(&mut *store.read().await?, trial).await?;
         let gait = store.compute(move |pool| gait.unpack(pool)).await??;
         let work = move |cancel: &_| simulate(&gait, &options, &done, cancel);
-        match run_cancellable(("walk simulator", AFTERWARDS), &cancelled, work).await?? {
+        match run_cancellable(("walk simulator", BACKGROUND_NICENESS), &cancelled, work).await?? {
             Some(report) => execution::record(&self.store, trial, asked, report).await,
             None => Ok(()),
         }

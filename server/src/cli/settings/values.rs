@@ -13,7 +13,7 @@ use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
 /// Number of symbolic links that Linux follows.
-const LONGEST_CHAIN_OF_LINKS: u32 = 40;
+const MAX_LINK_CHAIN: u32 = 40;
 
 impl Settings {
     pub(in crate::cli) fn listen(&self) -> Result<SocketAddr, Error> {
@@ -25,7 +25,7 @@ impl Settings {
     pub(in crate::cli) fn database(&self) -> PathBuf {
         let mut path = PathBuf::from(self.text("database"));
         // In a circle of links, the path remains a link that cannot be opened.
-        for _ in 0..LONGEST_CHAIN_OF_LINKS {
+        for _ in 0..MAX_LINK_CHAIN {
             let Ok(target) = path.read_link() else { break };
             path.pop();
             path.push(target);

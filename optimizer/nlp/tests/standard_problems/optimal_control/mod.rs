@@ -136,7 +136,7 @@ pub fn catalyst_mixing(intervals: usize) -> Sparse {
 
 /// Largest altitude of a rocket (R. Goddard). States: altitude, velocity, mass; control: thrust.
 pub fn goddard_rocket(intervals: usize) -> Sparse {
-    const LARGEST_THRUST: f64 = 3.5;
+    const MAX_THRUST: f64 = 3.5;
     const LAST_MASS: f64 = 0.6;
     fn acceleration(s: &[Dual]) -> Dual {
         let (altitude, velocity, mass, thrust) = (s[0], s[1], s[2], s[3]);
@@ -154,7 +154,7 @@ pub fn goddard_rocket(intervals: usize) -> Sparse {
             between(1.0, INF, |_| 1.0).first(1.0),
             between(0.0, INF, |t| t * (1.0 - t)).first(0.0),
             between(LAST_MASS, 1.0, |t| 1.0 + (LAST_MASS - 1.0) * t).first(1.0).last(LAST_MASS),
-            between(0.0, LARGEST_THRUST, |_| 0.5 * LARGEST_THRUST),
+            between(0.0, MAX_THRUST, |_| 0.5 * MAX_THRUST),
         ],
         duration: ((0.0, INF), 1.0),
         cost: Cost::Last(&[(0, -1.0)], 0.0),

@@ -1,6 +1,6 @@
 //! A clone of a study with changes: the form for a new study, filled in with the set-up of another one.
 
-use super::fields::{KEPT, LEARNERS, NewStudyFields, learner};
+use super::fields::{KEPT_LEARNER, LEARNERS, NewStudyFields, learner};
 use crate::accessible::Named;
 use crate::bound_units;
 use gait_optimizer::{LocalOptimumChoice, TunedBounds};
@@ -25,7 +25,7 @@ impl NewStudyFields {
             reference_gait: plan.reference_gait_id.to_string(),
             muscles: if plan.muscles { "on" } else { "off" }.to_owned(),
             answer_source: plan.answer_source.as_str().to_owned(),
-            learner: known.map_or(KEPT, |(name, ..)| name).to_owned(),
+            learner: known.map_or(KEPT_LEARNER, |(name, ..)| name).to_owned(),
             number_of_trials: plan.number_of_trials.to_string(),
             unchanged_limit: plan.unchanged_limit.map_or_else(String::new, |limit| limit.to_string()),
             parallel_trials: plan.parallel_trials.to_string(),

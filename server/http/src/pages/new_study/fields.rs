@@ -118,7 +118,7 @@ impl Default for NewStudyFields {
 }
 
 /// The option of the learner that keeps the settings of the cloned study, which the form cannot show.
-pub(super) const KEPT: &str = "kept";
+pub(super) const KEPT_LEARNER: &str = "kept";
 
 impl NewStudyFields {
     /// The study whose set-up applies, if any.

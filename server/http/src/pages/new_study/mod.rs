@@ -8,7 +8,7 @@ mod tuned_and_fixed_bounds;
 
 use self::chosen_reference::ReferenceChoice;
 use self::clone::cloned;
-use self::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, SIMULATED_WALKS_EFFECTS};
+use self::fields::{DESCRIPTION, KEPT_LEARNER, LEARNERS, NEW_SUBJECT, NewStudyFields, SIMULATED_WALKS_EFFECTS};
 use self::planning::{faults, make};
 use self::tuned_and_fixed_bounds::SpaceEditor;
 use crate::AppState;
@@ -89,7 +89,7 @@ impl NewStudyPage {
 
     /// The learner of a cloned study, if the form cannot show its settings.
     fn keeps_learner(&self) -> bool {
-        self.cloned.is_some() && self.fields.learner == KEPT
+        self.cloned.is_some() && self.fields.learner == KEPT_LEARNER
     }
 
     /// The attributes of a field in the table of bounds, where a bound can be refused as a whole.

@@ -1,7 +1,7 @@
 //! The study that the form describes: checked, planned and created.
 
 use super::clone::cloned;
-use super::fields::{DESCRIPTION, KEPT, LEARNERS, NEW_SUBJECT, NewStudyFields, learner};
+use super::fields::{DESCRIPTION, KEPT_LEARNER, LEARNERS, NEW_SUBJECT, NewStudyFields, learner};
 use super::tuned_and_fixed_bounds::SpaceEditor;
 use crate::refused_fields::{FormCheck, RefusedFields};
 use gait_optimizer::{InitialGuess, LocalOptimumChoice, SolveOptions};
@@ -121,13 +121,13 @@ fn study_of(
         },
         learner: match learner(&fields.learner) {
             Some(chosen) => chosen,
-            None if like.is_some() && fields.learner == KEPT => base.learner,
+            None if like.is_some() && fields.learner == KEPT_LEARNER => base.learner,
             None => return Err(Error::invalid("learner", fields.learner.as_str(), &learners)),
         },
         number_of_trials: number("number_of_trials", &fields.number_of_trials, "1 to 10000")?,
         unchanged_limit: optional("unchanged_limit", &fields.unchanged_limit, "1 to 10000, or empty")?,
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
-        seed: number("seed", &fields.seed, &format!("0 to {}", seed::LARGEST_SEED))?,
+        seed: number("seed", &fields.seed, &format!("0 to {}", seed::MAX_SEED))?,
         repeat_results: Some(fields.repeat_results.is_some()),
         warm_start_from: if fields.warm_start_from_root.is_some() {
             WarmStartFrom::Root
@@ -171,9 +171,9 @@ const LOCAL_OPTIMUM: &str = "a whole number from 1, or empty, and empty beside a
 
 fn initial_guesses(fields: &NewStudyFields) -> Result<usize, Error> {
     let field = "initial_guesses";
-    let allowed = format!("1 to {}, or empty", InitialGuess::MOST);
+    let allowed = format!("1 to {}, or empty", InitialGuess::MAX_GUESSES);
     let number = optional(field, &fields.initial_guesses, &allowed)?.unwrap_or(SolveOptions::default().initial_guesses);
-    let is_allowed = (1..=InitialGuess::MOST).contains(&number);
+    let is_allowed = (1..=InitialGuess::MAX_GUESSES).contains(&number);
     is_allowed.then_some(number).ok_or_else(|| Error::invalid(field, fields.initial_guesses.as_str(), &allowed))
 }
 

@@ -6,7 +6,7 @@ use gaitwright_store::studies::{Evaluation, StudyState};
 use gaitwright_store::trials::SolveTimes;
 
 /// With fewer finished solves the study itself gives no estimate: the first one starts cold and takes longer than the others.
-const FEWEST_SOLVES: usize = 3;
+const MIN_SOLVES: usize = 3;
 
 /// A sentence about the time left; empty unless the study runs. `results` is the number of trials with a result, `workers` the
 /// number of solves that can run at a time. The first solves are estimated from `earlier` ones of any study.
@@ -25,7 +25,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize, 
     }
     let own = median(&solves).map(|median| (median, "the solves so far"));
     let Some((median, of)) = own.or(earlier.map(|earlier| (earlier.median_seconds, "the earlier solves here"))) else {
-        let missing = FEWEST_SOLVES - solves.len();
+        let missing = MIN_SOLVES - solves.len();
         if left as usize <= missing {
             return String::new();
         }
@@ -53,7 +53,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize, 
 fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= FEWEST_SOLVES)
+    sorted.get(sorted.len() / 2).copied().filter(|_| sorted.len() >= MIN_SOLVES)
 }
 
 #[cfg(test)]

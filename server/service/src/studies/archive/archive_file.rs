@@ -5,7 +5,7 @@
 
 use super::signature::{PublicKey, SigningKey};
 use crate::error::Error;
-use gaitwright_store::archived_row::{LARGEST_BLOB_BYTES, LARGEST_TEXT_BYTES, Row};
+use gaitwright_store::archived_row::{MAX_BLOB_BYTES, MAX_TEXT_BYTES, Row};
 use gaitwright_store::archived_rows::table;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -18,15 +18,15 @@ const COMPRESSION: i32 = 3;
 /// Largest accepted zstd window, as a power of two. The level above needs 2 MiB.
 const WINDOW_LOG: u32 = 23;
 /// Largest accepted line. Bytes are written as two hexadecimal digits.
-const LARGEST_LINE_BYTES: usize = 2 * LARGEST_BLOB_BYTES + LARGEST_TEXT_BYTES;
+const MAX_LINE_BYTES: usize = 2 * MAX_BLOB_BYTES + MAX_TEXT_BYTES;
 /// Largest accepted archive, uncompressed.
-const LARGEST_BYTES: u64 = 16 << 30;
+const MAX_BYTES: u64 = 16 << 30;
 /// Maximum number of trials.
-const MOST_TRIALS: u64 = 10_000;
+const MAX_TRIALS: u64 = 10_000;
 /// Maximum length of the reason of a refusal, characters.
-const LONGEST_REASON: usize = 500;
+const MAX_REASON: usize = 500;
 /// Maximum number of rows of any other table.
-const MOST_ROWS: u64 = 200_000;
+const MAX_ROWS: u64 = 200_000;
 
 #[derive(Serialize)]
 struct RowLine<'a> {
@@ -87,7 +87,7 @@ impl<W: Write> Packer<W> {
     pub(super) fn add(&mut self, table: &str, row: &Row) -> std::io::Result<()> {
         let mut line = serde_json::to_vec(&RowLine { table, sha256: &row.sha256(), row })?;
         line.push(b'\n');
-        if line.len() > LARGEST_LINE_BYTES {
+        if line.len() > MAX_LINE_BYTES {
             return Err(std::io::Error::other(format!("a row of {table} is too large for an archive")));
         }
         self.hash.update(&line);
@@ -150,7 +150,7 @@ pub(super) struct Unpacker<R: Read> {
 /// The error for an archive that is refused.
 pub(super) fn refuse(reason: impl std::fmt::Display) -> Error {
     // The reason may quote a row, which can have any length.
-    let reason: String = reason.to_string().trim_end_matches('.').chars().take(LONGEST_REASON).collect();
+    let reason: String = reason.to_string().trim_end_matches('.').chars().take(MAX_REASON).collect();
     Error::Malformed(format!("The archive was refused and nothing was changed: {reason}."))
 }
 
@@ -180,15 +180,15 @@ impl<R: Read> Unpacker<R> {
 
     pub(super) fn next(&mut self) -> Result<Next, Error> {
         let mut text = Vec::new();
-        let most = LARGEST_LINE_BYTES as u64 + 1;
+        let most = MAX_LINE_BYTES as u64 + 1;
         (&mut self.lines).take(most).read_until(b'\n', &mut text).map_err(refuse)?;
         self.bytes += text.len() as u64;
         let row = self.rows + 1;
-        if text.len() > LARGEST_LINE_BYTES {
-            return Err(refuse(format!("row {row} is larger than {LARGEST_LINE_BYTES} bytes")));
+        if text.len() > MAX_LINE_BYTES {
+            return Err(refuse(format!("row {row} is larger than {MAX_LINE_BYTES} bytes")));
         }
-        if self.bytes > LARGEST_BYTES {
-            return Err(refuse(format!("it expands to more than {LARGEST_BYTES} bytes")));
+        if self.bytes > MAX_BYTES {
+            return Err(refuse(format!("it expands to more than {MAX_BYTES} bytes")));
         }
         if text.pop() != Some(b'\n') {
             return Err(refuse("it is truncated"));
@@ -214,7 +214,7 @@ impl<R: Read> Unpacker<R> {
                 }
                 self.of_table = if place == self.place { self.of_table + 1 } else { 1 };
                 self.place = place;
-                let most = if table == "trials" { MOST_TRIALS } else { MOST_ROWS };
+                let most = if table == "trials" { MAX_TRIALS } else { MAX_ROWS };
                 if self.of_table > most {
                     return Err(refuse(format!("it has more than {most} rows of table {table}")));
                 }

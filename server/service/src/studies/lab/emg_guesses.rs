@@ -18,11 +18,11 @@ const MUSCLES: [(&str, &[&str], &[&str]); 4] = [
 const CONTACTS: [&str; 10] =
     ["heel", "switch", "fsr", "footsw", "strike", "contact", "grf", "force", "fz", "ground_force_vy"];
 /// Largest value of a signal from which it is taken to be a force in N.
-const LEAST_FORCE_N: f64 = 50.0;
+const MIN_FORCE_N: f64 = 50.0;
 /// Vertical force above which the foot is in contact, N.
 const CONTACT_FORCE_N: f64 = 20.0;
 /// Fewest strides that a signal without a telling name must give to be taken for heel strikes.
-const FEWEST_STRIDES: usize = 2;
+const MIN_STRIDES: usize = 2;
 
 /// The column of right heel strikes, and its threshold.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,7 @@ pub(super) fn heel_strikes(whole: &EmgRecording) -> Option<HeelStrikeColumn> {
             .channels
             .iter()
             .filter(|(name, samples)| side(name) != Some(NamedSide::Left) && has_two_values(samples));
-        switches.into_iter().find_map(|(name, samples)| with_strides(whole, name, samples, FEWEST_STRIDES))
+        switches.into_iter().find_map(|(name, samples)| with_strides(whole, name, samples, MIN_STRIDES))
     };
     by_name.or_else(by_signal)
 }
@@ -84,7 +84,7 @@ pub(super) fn heel_strikes(whole: &EmgRecording) -> Option<HeelStrikeColumn> {
 /// The column with its threshold, if it gives this number of strides.
 fn with_strides(whole: &EmgRecording, name: &str, samples: &[f64], fewest: usize) -> Option<HeelStrikeColumn> {
     let (low, high) = range(samples);
-    let threshold = if high > LEAST_FORCE_N { CONTACT_FORCE_N } else { 0.5 * (low + high) };
+    let threshold = if high > MIN_FORCE_N { CONTACT_FORCE_N } else { 0.5 * (low + high) };
     let strikes = whole.strikes_of_column(WHAT, name, threshold).ok()?;
     let strides = strides_between(&strikes).into_iter().filter(|stride| is_plausible(*stride)).count();
     (strides >= fewest).then(|| HeelStrikeColumn { column: name.to_owned(), threshold })

@@ -34,10 +34,10 @@ pub fn check_not_c3d(name: &str) -> Result<(), Error> {
 }
 
 /// Longest name of a file, characters.
-const LONGEST_FILE_NAME: usize = 200;
+const MAX_FILE_NAME: usize = 200;
 
 pub(super) fn check_file_name(name: Option<&str>) -> Result<(), Error> {
     let Some(name) = name else { return Ok(()) };
     check_not_c3d(name)?;
-    printable::name("reading.file_name", name, LONGEST_FILE_NAME).map(|_| ())
+    printable::name("reading.file_name", name, MAX_FILE_NAME).map(|_| ())
 }

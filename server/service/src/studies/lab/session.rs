@@ -16,7 +16,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Maximum length of a note, characters.
-const LONGEST_NOTE: usize = 2000;
+const MAX_NOTE: usize = 2000;
 
 /// Lab session to plan.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
@@ -140,7 +140,7 @@ pub async fn plan(
     new: &NewLabSession,
 ) -> Result<LabSession, Error> {
     studies::get(writer, study).await?;
-    printable::note("notes", &new.notes, LONGEST_NOTE)?;
+    printable::note("notes", &new.notes, MAX_NOTE)?;
     walkable::admit_pair(writer, study, ("trial_a", "trial_b"), (new.trial_a, new.trial_b)).await?;
     let before = lab_sessions::of_study(writer, study).await?.len();
     let row = lab_sessions::UnsavedLabSession {
@@ -232,7 +232,7 @@ pub async fn record_walk(
     walked: &RecordedWalk,
 ) -> Result<LabSessionProgress, Error> {
     let walk = checked_walk(walked.walk)?;
-    printable::note("note", &walked.note, LONGEST_NOTE)?;
+    printable::note("note", &walked.note, MAX_NOTE)?;
     let session = still_open(writer, id).await?;
     match next_walk(&session) {
         Some(next) if next == walk => {}
@@ -284,7 +284,7 @@ pub async fn still_open(writer: &mut Writer, id: LabSessionId) -> Result<LabSess
 /// # Errors
 /// [`Error::NotFound`], [`Error::Conflict`] if it is already closed.
 pub async fn close(writer: &mut Writer, actor: &Actor, id: LabSessionId, note: &str) -> Result<LabSession, Error> {
-    printable::note("note", note, LONGEST_NOTE)?;
+    printable::note("note", note, MAX_NOTE)?;
     still_open(writer, id).await?;
     lab_sessions::add_step(writer, actor, id, SessionStep::Closed, note).await?;
     let detail = json!({ "note": note });

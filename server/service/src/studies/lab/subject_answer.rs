@@ -22,7 +22,7 @@ use serde_json::json;
 use utoipa::ToSchema;
 
 /// Maximum length of a note, characters.
-const LONGEST_NOTE: usize = 2000;
+const MAX_NOTE: usize = 2000;
 
 /// The subject's answer.
 #[derive(Debug, Clone, Deserialize, ToSchema)]
@@ -53,7 +53,7 @@ pub async fn give(
     new: &NewAnswer,
 ) -> Result<LabSessionProgress, Error> {
     answering::refuse_retracted(new.answer)?;
-    printable::note("note", &new.note, LONGEST_NOTE)?;
+    printable::note("note", &new.note, MAX_NOTE)?;
     let session = still_shown(writer, id).await?;
     let number = next_number(&session);
     if !(1..=number).contains(&new.number) {

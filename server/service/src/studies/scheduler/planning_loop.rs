@@ -18,9 +18,9 @@ use std::time::{Duration, Instant};
 /// The longest time between two rounds of planning.
 const IDLE: Duration = Duration::from_secs(5);
 /// Pause before asking an engine that cannot work now whether it can take jobs.
-const ENGINE_AGAIN: Duration = Duration::from_millis(100);
+const ENGINE_RETRY_PAUSE: Duration = Duration::from_millis(100);
 /// Changes within this time are planned together.
-const TOGETHER: Duration = Duration::from_millis(10);
+const CHANGE_WINDOW: Duration = Duration::from_millis(10);
 
 impl Scheduler {
     pub(super) async fn keep_planning(&self, task: &Task) -> Result<(), Error> {
@@ -57,7 +57,7 @@ impl Scheduler {
                     // Wakes on a change or after the idle time. Changes close together are planned once.
                     () = &mut looked => break,
                     () = self.0.wake.notified() => {
-                        tokio::time::sleep(TOGETHER).await;
+                        tokio::time::sleep(CHANGE_WINDOW).await;
                         break;
                     }
                 }
@@ -69,7 +69,7 @@ impl Scheduler {
     pub(super) async fn wait_to_dispatch(&self, at: Option<Instant>) {
         tokio::time::sleep_until(at.unwrap_or_else(Instant::now).into()).await;
         while self.0.engine.problem().is_some() {
-            tokio::time::sleep(ENGINE_AGAIN).await;
+            tokio::time::sleep(ENGINE_RETRY_PAUSE).await;
         }
     }
 

@@ -16,9 +16,9 @@ use std::time::Duration;
 /// A silent worker loses its job well before the lease in the record expires.
 const ACK_WAITS_PER_LEASE: u32 = 3;
 /// Pause before a retry after an error of the broker.
-pub(super) const AGAIN: Duration = Duration::from_secs(1);
+pub(super) const RETRY_PAUSE: Duration = Duration::from_secs(1);
 /// Longest time for a check of the broker.
-const REACHED_WITHIN: Duration = Duration::from_secs(5);
+const CHECK_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long the broker holds a request for messages, and the interval of its heartbeats.
 pub(super) const EXPIRES: Duration = Duration::from_secs(10);
 pub(super) const BROKER_HEARTBEAT: Duration = Duration::from_secs(2);
@@ -39,7 +39,7 @@ pub(super) struct BrokerConnection {
 /// [`DispatchError::Unreachable`], also if the broker has no JetStream.
 pub async fn reach(url: &str) -> Result<String, DispatchError> {
     let (address, options) = address_and_credentials(url)?;
-    let options = options.connection_timeout(REACHED_WITHIN);
+    let options = options.connection_timeout(CHECK_TIMEOUT);
     let client = options.connect(address).await.map_err(unreachable)?;
     let about = client.server_info();
     if about.jetstream {
@@ -75,7 +75,7 @@ impl BrokerConnection {
         let (server, options) = address_and_credentials(url)?;
         let client = options
             .name(concat!("gaitwright ", env!("CARGO_PKG_VERSION")))
-            .reconnect_delay_callback(|_| AGAIN)
+            .reconnect_delay_callback(|_| RETRY_PAUSE)
             .retry_on_initial_connect()
             .connect(server)
             .await

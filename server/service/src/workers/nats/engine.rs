@@ -1,6 +1,6 @@
 //! The engine of the service for remote workers: publishes jobs, receives heartbeats and results.
 
-use super::broker_connection::{AGAIN, BROKER_HEARTBEAT, BrokerConnection, EXPIRES, unreachable};
+use super::broker_connection::{BROKER_HEARTBEAT, BrokerConnection, EXPIRES, RETRY_PAUSE, unreachable};
 use super::message::{ResultMessage, Sign, SolveOrder, pack, unpack};
 use crate::dispatch_error::DispatchError;
 use crate::workers::Assignment;
@@ -23,7 +23,7 @@ use tokio_util::sync::{CancellationToken, DropGuard};
 const WAITING: usize = 256;
 
 /// Number of deliveries of a result, one per lease, after which it is dropped. Its job was run again long ago.
-const MOST_DELIVERIES: i64 = 10;
+const MAX_DELIVERIES: i64 = 10;
 
 /// An engine whose jobs are run by remote workers.
 pub struct JetStream {
@@ -65,7 +65,7 @@ impl JetStream {
                             problem.send_replace(Some(error.to_string()));
                         }
                     }
-                    tokio::time::sleep(AGAIN).await;
+                    tokio::time::sleep(RETRY_PAUSE).await;
                 }
             }));
         }
@@ -226,8 +226,8 @@ async fn deliver(
 ) -> Result<(), DispatchError> {
     let delivered = message.info().map_or(1, |info| info.delivered);
     let (message, acker) = message.split();
-    if delivered > MOST_DELIVERIES {
-        tracing::error!(subject = %message.subject, "recording a result failed {MOST_DELIVERIES} times; discarding it");
+    if delivered > MAX_DELIVERIES {
+        tracing::error!(subject = %message.subject, "recording a result failed {MAX_DELIVERIES} times; discarding it");
         return acker.ack_with(AckKind::Term).await.map_err(unreachable);
     }
     let read = pool.run(move |_| unpack::<ResultMessage>(&message.payload)).await.map_err(unreachable)?;

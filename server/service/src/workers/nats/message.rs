@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Read;
 
 /// Largest uncompressed message, against decompression bombs.
-const LARGEST_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 256 << 20;
 /// zstd level. Speed matters more than size on a local network.
 const COMPRESSION: i32 = 3;
 
@@ -61,9 +61,9 @@ pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, DispatchError> {
     let unreadable = |reason: String| DispatchError::Message(reason);
     let reader = zstd::Decoder::new(bytes).map_err(|e| unreadable(e.to_string()))?;
     let mut plain = Vec::new();
-    reader.take(LARGEST_BYTES + 1).read_to_end(&mut plain).map_err(|e| unreadable(e.to_string()))?;
-    if plain.len() as u64 > LARGEST_BYTES {
-        return Err(unreadable(format!("it expands to more than {LARGEST_BYTES} bytes")));
+    reader.take(MAX_BYTES + 1).read_to_end(&mut plain).map_err(|e| unreadable(e.to_string()))?;
+    if plain.len() as u64 > MAX_BYTES {
+        return Err(unreadable(format!("it expands to more than {MAX_BYTES} bytes")));
     }
     rmp_serde::from_slice(&plain).map_err(|e| unreadable(e.to_string()))
 }
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn decompression_bombs_are_refused() {
-        let zeros = zstd::encode_all(std::io::repeat(0).take(LARGEST_BYTES + 1), 1).unwrap();
+        let zeros = zstd::encode_all(std::io::repeat(0).take(MAX_BYTES + 1), 1).unwrap();
         assert!(unpack::<Sign>(&zeros).unwrap_err().to_string().contains("more than"));
     }
 

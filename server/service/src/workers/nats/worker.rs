@@ -1,6 +1,6 @@
 //! The remote worker: pulls jobs from the broker, solves them on its own threads, and publishes heartbeats and results.
 
-use super::broker_connection::{AGAIN, BrokerConnection, unreachable};
+use super::broker_connection::{BrokerConnection, RETRY_PAUSE, unreachable};
 use super::message::{ResultMessage, Sign, SolveOrder, pack, unpack};
 use super::same_version::PROGRAM;
 use crate::dispatch_error::DispatchError;
@@ -21,15 +21,15 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
 /// How long the broker holds a request for one job.
-const PULL: Duration = Duration::from_secs(5);
+const PULL_TIMEOUT: Duration = Duration::from_secs(5);
 /// Time to publish remaining results when the worker stops.
 const DRAIN: Duration = Duration::from_secs(20);
 /// Number of leases after which an unpublished result is dropped. By then its job is lost or runs elsewhere.
-const GIVE_UP_AFTER_LEASES: u32 = 10;
+const MAX_UNPUBLISHED_LEASES: u32 = 10;
 /// Longest pause before publishing a result is retried.
-const LONGEST_PAUSE: Duration = Duration::from_secs(15);
+const MAX_PAUSE: Duration = Duration::from_secs(15);
 /// Least time between two heartbeats of a solve.
-const SIGN_EVERY: Duration = Duration::from_millis(300);
+const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(300);
 
 /// Runs jobs of a broker.
 pub struct NatsWorker {
@@ -125,7 +125,7 @@ impl NatsWorker {
                     Ok(None) => slot = Some(permit),
                     Err(error) => {
                         tracing::warn!(broker = %self.link.address, %error, "cannot pull a job; retrying");
-                        tokio::time::sleep(AGAIN).await;
+                        tokio::time::sleep(RETRY_PAUSE).await;
                         slot = Some(permit);
                     }
                 }
@@ -135,7 +135,7 @@ impl NatsWorker {
 
     async fn pull_one(&self) -> Result<Option<jetstream::Message>, DispatchError> {
         let consumer = self.link.workers().await?;
-        let mut batch = consumer.batch().max_messages(1).expires(PULL).messages().await.map_err(unreachable)?;
+        let mut batch = consumer.batch().max_messages(1).expires(PULL_TIMEOUT).messages().await.map_err(unreachable)?;
         batch.next().await.transpose().map_err(unreachable)
     }
 
@@ -162,7 +162,7 @@ impl NatsWorker {
         tracing::info!(trial = %attempt.trial, attempt = attempt.number, "started a job");
         if let Err(error) = self.engine.submit(order.assignment).await {
             tracing::error!(%error, "cannot start a job; leaving it to other workers");
-            return answer(&acker, AckKind::Nak(Some(AGAIN))).await;
+            return answer(&acker, AckKind::Nak(Some(RETRY_PAUSE))).await;
         }
         let now = Instant::now();
         let job = HeldJob {
@@ -184,7 +184,7 @@ impl NatsWorker {
                 let now = Instant::now();
                 job.unreported.push(record);
                 job.last_renewal = now;
-                if now.duration_since(job.last_sign) >= SIGN_EVERY.min(self.link.ack_wait() / 4) {
+                if now.duration_since(job.last_sign) >= HEARTBEAT_INTERVAL.min(self.link.ack_wait() / 4) {
                     job.last_sign = now;
                     answer(&job.acker, AckKind::Progress).await;
                     let records = std::mem::take(&mut job.unreported);
@@ -262,7 +262,7 @@ async fn deliver(
     let Ok((link, bytes)) = bytes.await else { return };
     match bytes {
         Ok(bytes) => {
-            if let Err(error) = publish_within(&link, attempt, &bytes, link.lease * GIVE_UP_AFTER_LEASES).await {
+            if let Err(error) = publish_within(&link, attempt, &bytes, link.lease * MAX_UNPUBLISHED_LEASES).await {
                 tracing::error!(trial = %attempt.trial, %error, "dropping a result; leaving its job to other workers");
                 // After a pause, because a redelivered job comes before all queued ones.
                 return answer(&acker, AckKind::Nak(Some(link.lease))).await;
@@ -284,13 +284,13 @@ async fn publish_within(
     limit: Duration,
 ) -> Result<(), DispatchError> {
     let begun = Instant::now();
-    let mut pause = AGAIN;
+    let mut pause = RETRY_PAUSE;
     loop {
         match publish(link, attempt, bytes).await {
             Err(error) if begun.elapsed() < limit => {
                 tracing::warn!(trial = %attempt.trial, %error, "cannot publish a result; retrying");
                 tokio::time::sleep(pause).await;
-                pause = (pause * 2).min(LONGEST_PAUSE);
+                pause = (pause * 2).min(MAX_PAUSE);
             }
             done => return done,
         }

@@ -45,7 +45,7 @@ const READ_BY_NOUN: [&str; 13] = [
     "status",
 ];
 /// Maximum length of any other text, characters. Longer than any note.
-const LONGEST_TEXT: usize = 20_000;
+const MAX_TEXT: usize = 20_000;
 /// Tolerance for the difference between the clocks of two machines, s.
 const CLOCKS_DIFFER_S: i64 = 600;
 /// Checks a row by itself: text is printable, times have passed, identifiers are well-formed.
@@ -56,7 +56,7 @@ pub(super) fn cells(table: &str, row: &Row) -> Result<(), Error> {
         if READ_BY_NOUN.contains(&column) {
             continue;
         }
-        printable::note(&field, text, LONGEST_TEXT).map_err(refuse)?;
+        printable::note(&field, text, MAX_TEXT).map_err(refuse)?;
         if matches!(column, "author" | "rater") && printable::name(&field, text, 80).map_err(refuse)? != text {
             return Err(refuse(format!("{field} is {text:?}, which has leading or trailing spaces")));
         }
