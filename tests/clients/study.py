@@ -50,7 +50,7 @@ from gaitwright_client.models import (
     ReportedLabel,
     SearchSpace,
     StudyState,
-    StudyView,
+    StudyWithCommands,
     Subject,
     TellRequest,
     Trial,
@@ -66,7 +66,7 @@ FIGURE = "course-gait-rmse-of-the-best-action-by-iteration"
 ARCHIVE = b"gaitwright study"
 
 T = TypeVar("T")
-Made = TypeVar("Made", CreatedToken, CreatedPreference, StudyView, Subject)
+Made = TypeVar("Made", CreatedToken, CreatedPreference, StudyWithCommands, Subject)
 
 
 def given(kind: type[T], reply: object) -> T:
@@ -109,7 +109,7 @@ def trials_of(client: Client, study: UUID) -> list[Trial]:
 def by_script(client: Client, subject: UUID) -> None:
     """A script evaluates every trial."""
     new = NewStudy(subject_id=subject, evaluation=Evaluation.SCRIPT, number_of_trials=TRIALS)
-    study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new))
+    study = created(StudyWithCommands, "studies", create_study.sync_detailed(client=client, body=new))
     while True:
         asked = ask_for_trial.sync_detailed(study.id, client=client, body=AskRequest(script="treadmill"))
         if asked.status_code == HTTPStatus.CONFLICT:
@@ -132,7 +132,7 @@ def by_script(client: Client, subject: UUID) -> None:
 def wait_until(client: Client, study: UUID, *states: StudyState) -> StudyState:
     """Waits until the study has one of these states."""
     for _ in range(SECONDS * 20):
-        state = given(StudyView, get_study.sync(study, client=client)).state
+        state = given(StudyWithCommands, get_study.sync(study, client=client)).state
         if state in states:
             return state
         time.sleep(0.05)
@@ -148,7 +148,7 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
         ]
     )
     new = NewStudy(subject_id=subject, answer_source=AnswerSource.PEOPLE, search_space=space, number_of_trials=4)
-    study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
+    study = created(StudyWithCommands, "studies", create_study.sync_detailed(client=client, body=new)).id
     compared = 1
     while wait_until(client, study, StudyState.WAITING, StudyState.FINISHED) == StudyState.WAITING:
         trials = trials_of(client, study)
@@ -181,7 +181,7 @@ def by_a_person(administrator: Client, client: Client, subject: UUID) -> None:
 def with_a_job(client: Client, subject: UUID) -> None:
     """Gait RMSE answers the comparisons; a certificate is made on request."""
     new = NewStudy(subject_id=subject, number_of_trials=TRIALS)
-    study = created(StudyView, "studies", create_study.sync_detailed(client=client, body=new)).id
+    study = created(StudyWithCommands, "studies", create_study.sync_detailed(client=client, body=new)).id
     wait_until(client, study, StudyState.FINISHED)
     followed = 0
     for trial in trials_of(client, study):

@@ -87,7 +87,7 @@ async fn served_documents_have_exactly_the_described_properties() {
         let made = service.post("/api/v1/studies", &study).await;
         assert!(made.status.is_success(), "{}", made.text);
         let id = made.json()["id"].as_str().unwrap().parse().unwrap();
-        described.hold_named("StudyView", &service.fetch(&format!("/api/v1/studies/{id}")).await.json());
+        described.hold_named("StudyWithCommands", &service.fetch(&format!("/api/v1/studies/{id}")).await.json());
         service.wait_for(id, &[StudyState::Finished]).await;
         for trial in service.trials(id).await {
             for (component, document) in

@@ -1,8 +1,8 @@
 //! Authentication: finds the caller of a request from its token or session cookie, before any handler.
 
 use super::{AppState, request_body};
+use crate::error_page_reader::RespondedTo;
 use crate::problem_details::Refusal;
-use crate::responded_to::RespondedTo;
 use axum::body::HttpBody;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, header};

@@ -3,6 +3,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+pub mod access_log_buffer;
 pub mod access_log_layer;
 mod accessible;
 pub mod api;
@@ -20,6 +21,7 @@ pub mod connections;
 mod csv_response;
 mod described_parameters;
 mod entity_tag;
+mod error_page_reader;
 mod extractors;
 mod figures;
 mod form_errors;
@@ -50,7 +52,6 @@ mod refused_fields;
 mod request_body;
 pub mod request_counts;
 mod resources;
-mod responded_to;
 mod responses;
 mod router;
 mod same_origin;
@@ -60,7 +61,6 @@ mod static_files;
 mod study_listener;
 mod trusted_proxies;
 mod units;
-pub mod unwritten_access;
 mod visible;
 
 pub use client_address::ClientAddress;

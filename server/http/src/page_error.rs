@@ -1,7 +1,7 @@
 //! Errors as pages.
 
+use crate::error_page_reader::RespondedTo;
 use crate::problem_details::{Problem, Refusal};
-use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::http::{Method, StatusCode, Uri};
 use axum::response::{Html, IntoResponse, Redirect, Response};
@@ -53,7 +53,7 @@ fn without_identifier(detail: &str) -> Option<String> {
     if let Some((missing, owner)) = what.split_once(" for ") {
         return Some(format!("There is no {missing} for this {owner}."));
     }
-    Some(format!("There is no such {what}, or you have no access to it."))
+    Some(format!("This {what} does not exist, or you do not have access to it."))
 }
 
 /// A plain heading for statuses whose problem title is HTTP jargon.
@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn page_names_no_identifier_of_a_missing_object() {
         let shown = without_identifier("There is no lab session 01890000-0000-7000-8000-000000000000.");
-        assert_eq!(shown.as_deref(), Some("There is no such lab session, or you have no access to it."));
+        assert_eq!(shown.as_deref(), Some("This lab session does not exist, or you do not have access to it."));
         let shown = without_identifier("There is no gait for trial 01890000-0000-7000-8000-000000000000.");
         assert_eq!(shown.as_deref(), Some("There is no gait for this trial."));
         assert_eq!(without_identifier("The address /nothing does not exist."), None);

@@ -1,10 +1,10 @@
 //! The outermost layer: gives each request an identifier, and turns every failure into a problem document or an error
 //! page.
 
+use super::error_page_reader::RespondedTo;
 use super::page_error::{is_for_programs, shown};
 use super::problem_details::Problem;
 use super::problem_kinds::ProblemKind;
-use super::responded_to::RespondedTo;
 use axum::extract::{MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::middleware::Next;

@@ -1,9 +1,9 @@
 //! The state that all handlers share.
 
+use super::access_log_buffer::AccessLog;
 use super::host_header::Hosts;
 use super::request_counts::Requests;
 use super::trusted_proxies::Proxies;
-use super::unwritten_access::AccessLog;
 use gaitwright_compute::{ComputeError, OnPool};
 use gaitwright_service::access::Clock;
 use gaitwright_service::access::secret::PasswordCheckQueues;

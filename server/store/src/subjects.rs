@@ -184,8 +184,8 @@ pub async fn correct(
 /// Errors of the database.
 pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<Correction>> {
     let rows = sqlx::query(
-        "select c.*, coalesce(lag(c.height_m) over (order by c.seq), s.height_m) as former_height_m, \
-         coalesce(lag(c.body_mass_kg) over (order by c.seq), s.body_mass_kg) as former_body_mass_kg \
+        "select c.*, coalesce(lag(c.height_m) over (order by c.seq), s.height_m) as previous_height_m, \
+         coalesce(lag(c.body_mass_kg) over (order by c.seq), s.body_mass_kg) as previous_body_mass_kg \
          from subject_corrections c join subjects s on s.id = c.subject_id where c.subject_id = ? order by c.seq",
     )
     .bind(id);
@@ -193,8 +193,8 @@ pub async fn corrections(db: &mut Connection, id: SubjectId) -> StoreResult<Vec<
         Ok(Correction {
             seq: row.try_get("seq")?,
             former: Body {
-                height_m: row.try_get("former_height_m")?,
-                body_mass_kg: row.try_get("former_body_mass_kg")?,
+                height_m: row.try_get("previous_height_m")?,
+                body_mass_kg: row.try_get("previous_body_mass_kg")?,
             },
             height_m: row.try_get("height_m")?,
             body_mass_kg: row.try_get("body_mass_kg")?,

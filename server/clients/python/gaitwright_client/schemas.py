@@ -216,8 +216,8 @@ WalkCondition = Literal["normal", "gait_a", "gait_b"]
 WarmStartFrom = Literal["incumbent", "root"]
 
 
-class AccessRow(TypedDict):
-    """Row of the access log."""
+class AccessLogEntry(TypedDict):
+    """Entry of the access log."""
 
     # Who made the request.
     actor: str
@@ -499,8 +499,8 @@ AuditDetail = TypedDict(
 )
 
 
-class AuditRow(TypedDict):
-    """Row of the audit trail."""
+class AuditEntry(TypedDict):
+    """Entry of the audit trail."""
 
     # Who made the change.
     actor: str
@@ -662,6 +662,17 @@ class Bounds(TypedDict):
     a7: float
     # Maximum ankle angle, °.
     a8: float
+
+
+class Caller(TypedDict):
+    """Caller of the request."""
+
+    # Name of the user or the token.
+    name: str
+    # Rights of the caller.
+    rights: list[Right]
+    # Role of the user. Null for tokens.
+    role: Optional[Role]
 
 
 class Certificate(TypedDict):
@@ -899,12 +910,12 @@ class Correction(TypedDict):
     body_mass_kg: float
     # Time of the correction.
     created_at: Instant
-    # Body mass before the correction, kg.
-    former_body_mass_kg: float
-    # Body height before the correction, m.
-    former_height_m: float
     # Corrected body height, m.
     height_m: float
+    # Body mass before the correction, kg.
+    previous_body_mass_kg: float
+    # Body height before the correction, m.
+    previous_height_m: float
     # Reason for the correction.
     reason: str
     # Sequence number.
@@ -983,17 +994,6 @@ class CreatedToken(Token):
 
     # Secret, shown once. Send it as `Authorization: Bearer SECRET`.
     secret: str
-
-
-class CurrentUser(TypedDict):
-    """Caller of the request."""
-
-    # Name of the user or the token.
-    name: str
-    # Rights of the caller.
-    rights: list[Right]
-    # Role of the user. Null for tokens.
-    role: Optional[Role]
 
 
 class CycleActivity(TypedDict):
@@ -1200,15 +1200,6 @@ class EmgSettings(TypedDict, total=False):
     envelope_hz: float
     # Order of both filters: 2, 4, 6 or 8.
     order: Literal[2, 4, 6, 8]
-
-
-class EmgView(TypedDict):
-    """Processed EMG of a session, with the model's muscle activity."""
-
-    # Muscle activity of the model. Empty while the session is blinded, and for gaits without muscles.
-    model: list[WalkModel]
-    # Measured activity.
-    result: EmgResult
 
 
 class ExecutionReport(TypedDict):
@@ -1478,6 +1469,21 @@ class Health(TypedDict):
     version: str
 
 
+class HistoryEntry(TypedDict):
+    """The recommendation after one iteration of the study."""
+
+    # Cost of transport of the best trial. Null if the script that evaluated the trial did not report it.
+    cost_of_transport: Optional[float]
+    # Gait RMSE of the best trial, rad. Null if the script that evaluated the trial did not report it.
+    gait_rmse_rad: Optional[float]
+    # Number of results so far, from 1.
+    iteration: int
+    # Number of the best trial.
+    number: int
+    # Best trial after this iteration of the study.
+    trial_id: TrialId
+
+
 class Import(TypedDict):
     """Import of a study."""
 
@@ -1592,6 +1598,42 @@ class LabAnswer(TypedDict):
     number: int
 
 
+class LabSession(TypedDict):
+    """Lab session, without blinded data."""
+
+    # Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
+    # and then imported.
+    allocation_included: bool
+    # Current answer of the subject. Null if there is none.
+    answer: Optional[LabAnswer]
+    # Who closed the session, and when. Null while it is open.
+    closed: Optional[LabSessionStep]
+    # Downloads of the controller files of the walks.
+    controller_files: list[ControllerFileDownload]
+    # Time of planning.
+    created_at: Instant
+    # Identifier.
+    id: LabSessionId
+    # Free text.
+    notes: str
+    # Number of the session in this study, from 1.
+    number: int
+    # Who planned the session.
+    planned_by: str
+    # State of the session.
+    state: LabSessionState
+    # Identifier of the study.
+    study_id: StudyId
+    # The trial with gait A. Does not imply the order of the walks.
+    trial_a: TrialId
+    # The trial with gait B.
+    trial_b: TrialId
+    # Who unblinded the session, when and why. Null while it is blinded.
+    unblinded: Optional[LabSessionStep]
+    # The three walks.
+    walks: list[WalkView]
+
+
 class LabSessionClosing(TypedDict, total=False):
     """Request to close a lab session."""
 
@@ -1639,42 +1681,6 @@ class LabSessionUnblinding(TypedDict):
 
     # Reason, 1 to 2000 characters.
     reason: str
-
-
-class LabSessionView(TypedDict):
-    """Lab session, without blinded data."""
-
-    # Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
-    # and then imported.
-    allocation_included: bool
-    # Current answer of the subject. Null if there is none.
-    answer: Optional[LabAnswer]
-    # Who closed the session, and when. Null while it is open.
-    closed: Optional[LabSessionStep]
-    # Downloads of the controller files of the walks.
-    controller_files: list[ControllerFileDownload]
-    # Time of planning.
-    created_at: Instant
-    # Identifier.
-    id: LabSessionId
-    # Free text.
-    notes: str
-    # Number of the session in this study, from 1.
-    number: int
-    # Who planned the session.
-    planned_by: str
-    # State of the session.
-    state: LabSessionState
-    # Identifier of the study.
-    study_id: StudyId
-    # The trial with gait A. Does not imply the order of the walks.
-    trial_a: TrialId
-    # The trial with gait B.
-    trial_b: TrialId
-    # Who unblinded the session, when and why. Null while it is blinded.
-    unblinded: Optional[LabSessionStep]
-    # The three walks.
-    walks: list[WalkView]
 
 
 class LearnerSettings(TypedDict, total=False):
@@ -1854,21 +1860,6 @@ class MeshIntervals(TypedDict):
     ss1: int
     # Intervals of SS2.
     ss2: int
-
-
-class Milestone(TypedDict):
-    """The recommendation after one iteration of the study."""
-
-    # Cost of transport of the best trial. Null if the script that evaluated the trial did not report it.
-    cost_of_transport: Optional[float]
-    # Gait RMSE of the best trial, rad. Null if the script that evaluated the trial did not report it.
-    gait_rmse_rad: Optional[float]
-    # Number of results so far, from 1.
-    iteration: int
-    # Number of the best trial.
-    number: int
-    # Best trial after this iteration of the study.
-    trial_id: TrialId
 
 
 class ModelActivity(TypedDict):
@@ -2487,6 +2478,15 @@ class Problem(_ProblemRequired, total=False):
     request_id: str
     # Value that was given.
     value: Any
+
+
+class ProcessedEmg(TypedDict):
+    """Processed EMG of a session, with the model's muscle activity."""
+
+    # Muscle activity of the model. Empty while the session is blinded, and for gaits without muscles.
+    model: list[WalkModel]
+    # Measured activity.
+    result: EmgResult
 
 
 class Proportion(TypedDict):
@@ -3263,7 +3263,7 @@ class StudyRestriction(TypedDict):
     restricted: bool
 
 
-class StudyView(Study):
+class StudyWithCommands(Study):
     """Study with its possible commands."""
 
     # Commands that are possible in the current state: `start`, `pause`, `resume`, `stop`, `extend`.

@@ -6,7 +6,7 @@ use crate::authorization::Authorized;
 use crate::idempotent::IdempotentWith;
 use crate::problem_details::Refusal;
 use crate::resources::document_schemas;
-use crate::resources::emg::EmgView;
+use crate::resources::emg::ProcessedEmg;
 use crate::visible::Visible;
 use axum::Json;
 use axum::extract::State;
@@ -46,7 +46,7 @@ fn of_settings(error: Error) -> Error {
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
     request_body = EmgProcessing,
-    responses((status = 201, description = "Result", body = EmgView)),
+    responses((status = 201, description = "Result", body = ProcessedEmg)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -65,26 +65,26 @@ pub(super) async fn create(
     };
     lab::keep_result(&mut writer, &request.actor, id, &view.result).await?;
     let location = format!("/api/v1/lab-sessions/{id}/emg-results");
-    request.created(&app, writer, location, &EmgView::from(view)).await
+    request.created(&app, writer, location, &ProcessedEmg::from(view)).await
 }
 
-/// Get the processed EMG
+/// Get the newest EMG result
 ///
 /// The newest result. After unblinding, includes the muscle activity of the model. Without a result, the status is 404.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/emg-results",
-    operation_id = "get_emg_results",
+    operation_id = "get_emg_result",
     tag = "lab",
     params(("id" = LabSessionId, Path, description = "Identifier of the lab session")),
-    responses((status = 200, description = "Newest result", body = EmgView), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "Newest result", body = ProcessedEmg), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn get(
     _: Authorized<Read>,
     State(mut app): State<AppState>,
     Visible(id, _): Visible<LabSessionId, Read>,
-) -> Result<Json<EmgView>, Refusal> {
+) -> Result<Json<ProcessedEmg>, Refusal> {
     let found = lab::emg(app.store_mut(), id).await?;
     let missing = || Error::NotFound { what: "EMG result for lab session".to_owned(), id: id.to_string() };
     Ok(Json(found.ok_or_else(missing)?.into()))

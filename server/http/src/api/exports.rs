@@ -62,7 +62,7 @@ pub(super) async fn problem(
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.mot",
-    operation_id = "get_gait_motion_file",
+    operation_id = "get_opensim_file",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial"), ("rate_hz" = Option<f64>, Query, description = "Sampling rate, 10 to 5000 Hz. Default 200")),
     responses((status = 200, description = "OpenSim motion file in degrees, with OpenSim's signs", body = String, content_type = "text/plain"), (status = 409, description = "The subject withdrew consent")),

@@ -50,7 +50,7 @@ struct MotionFrame {
 #[utoipa::path(
     get,
     path = "/trials/{id}/motion",
-    operation_id = "get_gait_motion",
+    operation_id = "get_stick_figures",
     tag = "trials",
     params(("id" = TrialId, Path, description = "Identifier of the trial")),
     responses((status = 200, description = "Motion", body = GaitMotion), (status = 409, description = "The subject withdrew consent")),

@@ -13,7 +13,7 @@ use gaitwright_charts::csv_table::{CsvTable, cells};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::history::{self, HistoryEntry};
 use gaitwright_service::studies::recommended_trial::ranking_to_show;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::{StudyId, studies};
@@ -28,7 +28,7 @@ use std::sync::Arc;
     operation_id = "list_study_history",
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
-    responses((status = 200, description = "A page, in order of iterations", body = Page<Milestone>), (status = 409, description = "The subject withdrew consent")),
+    responses((status = 200, description = "A page, in order of iterations", body = Page<HistoryEntry>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn of_study(
@@ -36,7 +36,7 @@ pub(super) async fn of_study(
     State(mut app): State<AppState>,
     Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<u32>,
-) -> Result<Json<Page<Milestone>>, Refusal> {
+) -> Result<Json<Page<HistoryEntry>>, Refusal> {
     Ok(Json(paging.cut(read(&mut app, id).await?, |milestone| milestone.iteration)?))
 }
 
@@ -60,7 +60,7 @@ pub(super) async fn of_study_csv(
     table(&mut app, id).await
 }
 
-async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<Milestone>, Refusal> {
+async fn read(app: &mut AppState, id: StudyId) -> Result<Vec<HistoryEntry>, Refusal> {
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let snapshot = StudySnapshot::read(&mut reader, study).await?;
@@ -78,7 +78,7 @@ async fn table(app: &mut AppState, id: StudyId) -> Result<Response, Refusal> {
     csv_response(app, &format!("history-{}.csv", id.short()), move || written(&history)).await
 }
 
-fn written(history: &[Milestone]) -> CsvTable {
+fn written(history: &[HistoryEntry]) -> CsvTable {
     let mut table = CsvTable::new(["iteration", "best_trial", "gait_rmse_rad", "cost_of_transport"]);
     for m in history {
         table.row(cells![m.iteration, m.number, m.gait_rmse_rad, m.cost_of_transport]);

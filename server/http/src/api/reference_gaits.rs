@@ -97,7 +97,7 @@ pub(super) async fn get(
 #[utoipa::path(
     get,
     path = "/subjects/{id}/reference-gaits",
-    operation_id = "list_nearest_reference_gaits",
+    operation_id = "list_reference_gaits_by_distance",
     tag = "subjects",
     params(("id" = SubjectId, Path, description = "Identifier of the subject")),
     responses((status = 200, description = "Reference gaits with distances", body = Page<ReferenceGaitMatch>)),

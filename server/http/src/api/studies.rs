@@ -26,7 +26,7 @@ use utoipa::ToSchema;
 
 /// Study with its possible commands.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct StudyView {
+pub(super) struct StudyWithCommands {
     #[serde(flatten)]
     study: Study,
     /// Numbers of trials by state.
@@ -35,7 +35,7 @@ pub(super) struct StudyView {
     possible: Vec<&'static str>,
 }
 
-impl StudyView {
+impl StudyWithCommands {
     async fn of(db: &mut Connection, study: studies::Study) -> Result<Self, Refusal> {
         let trials = trials::counts(db, study.id).await?;
         let possible = transitions_for_people(study.state).into_iter().map(StudyTransition::as_str).collect();
@@ -72,14 +72,14 @@ pub(super) struct StudyQuery {
         ("state" = Option<StudyState>, Query, description = "Only studies in this state"),
         ("archived" = Option<bool>, Query, description = "If true, only archived studies. If false (the default), only studies that are not archived")
     ),
-    responses((status = 200, description = "A page", body = Page<StudyView>)),
+    responses((status = 200, description = "A page", body = Page<StudyWithCommands>)),
     security(("token" = ["read"]), ("session" = ["read"])),
 )]
 pub(super) async fn list(
     authorized: Authorized<Read>,
     State(app): State<AppState>,
     paging: Paging<StudyId, StudyQuery>,
-) -> Result<Json<Page<StudyView>>, Refusal> {
+) -> Result<Json<Page<StudyWithCommands>>, Refusal> {
     let mut reader = app.read().await?;
     let (before, limit) = (paging.after, paging.to_read());
     let StudyQuery { subject_id: subject, text, tag, state, archived } = paging.filter.clone();
@@ -88,7 +88,7 @@ pub(super) async fn list(
     let (found, next) = paging.page(found, |study| study.id)?.into_parts();
     let mut views = Vec::with_capacity(found.len());
     for study in found {
-        views.push(StudyView::of(&mut reader, study).await?);
+        views.push(StudyWithCommands::of(&mut reader, study).await?);
     }
     Ok(Json(Page::of_parts(views, next)))
 }
@@ -105,7 +105,7 @@ pub(super) async fn list(
     responses((
         status = 200,
         description = "The study",
-        body = StudyView,
+        body = StudyWithCommands,
         headers(("ETag" = String, description = "Revision, for the If-Match header of a change"))
     )),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -118,7 +118,7 @@ pub(super) async fn get(
     let mut reader = app.read().await?;
     let study = studies::get(&mut reader, id).await?;
     let revision = study.revision;
-    Ok(tagged(Json(StudyView::of(&mut reader, study).await?).into_response(), revision))
+    Ok(tagged(Json(StudyWithCommands::of(&mut reader, study).await?).into_response(), revision))
 }
 
 /// Create a study
@@ -130,7 +130,7 @@ pub(super) async fn get(
     operation_id = "create_study",
     tag = "studies",
     request_body = NewStudy,
-    responses((status = 201, description = "Study", body = StudyView), (status = 404, description = "No such subject, device or reference gait")),
+    responses((status = 201, description = "Study", body = StudyWithCommands), (status = 404, description = "No such subject, device or reference gait")),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn create(
@@ -165,7 +165,7 @@ pub(super) struct StateChangeReason {
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body(content = StateChangeReason, description = "Optional: the reason"),
-    responses((status = 200, description = "Started study", body = StudyView)),
+    responses((status = 200, description = "Started study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn start(
@@ -187,7 +187,7 @@ pub(super) async fn start(
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body(content = StateChangeReason, description = "Optional: the reason"),
-    responses((status = 200, description = "Paused study", body = StudyView)),
+    responses((status = 200, description = "Paused study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn pause(
@@ -209,7 +209,7 @@ pub(super) async fn pause(
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body(content = StateChangeReason, description = "Optional: the reason"),
-    responses((status = 200, description = "Resumed study", body = StudyView)),
+    responses((status = 200, description = "Resumed study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn resume(
@@ -231,7 +231,7 @@ pub(super) async fn resume(
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body(content = StateChangeReason, description = "Optional: the reason"),
-    responses((status = 200, description = "Stopped study", body = StudyView)),
+    responses((status = 200, description = "Stopped study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn stop(
@@ -258,7 +258,7 @@ async fn transition(
     expected.check(studies::get(&mut writer, id).await?.revision)?;
     let done = command::transition(&mut writer, &request.actor, id, transition, &why.reason).await?;
     let revision = done.study.revision;
-    let view = StudyView::of(&mut writer, done.study).await?;
+    let view = StudyWithCommands::of(&mut writer, done.study).await?;
     let answer = request.done(app, writer, &view).await?;
     for trial in done.cancelled {
         app.scheduler.cancel_solve(trial).await;
@@ -277,7 +277,7 @@ async fn transition(
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body = StudyChange,
-    responses((status = 200, description = "Updated study", body = StudyView)),
+    responses((status = 200, description = "Updated study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn patch(
@@ -293,7 +293,7 @@ pub(super) async fn patch(
     expected.check(studies::get(&mut writer, id).await?.revision)?;
     let study = study_change::change(&mut writer, &request.actor, request.caller.reach(), id, &new).await?;
     let revision = study.revision;
-    let view = StudyView::of(&mut writer, study).await?;
+    let view = StudyWithCommands::of(&mut writer, study).await?;
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
@@ -307,7 +307,7 @@ pub(super) async fn patch(
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study"), IfMatch),
     request_body = StudyExtension,
-    responses((status = 200, description = "Extended study", body = StudyView)),
+    responses((status = 200, description = "Extended study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn extend(
@@ -323,7 +323,7 @@ pub(super) async fn extend(
     expected.check(studies::get(&mut writer, id).await?.revision)?;
     let study = study_extension::extend(&mut writer, &request.actor, id, &more).await?;
     let revision = study.revision;
-    let view = StudyView::of(&mut writer, study).await?;
+    let view = StudyWithCommands::of(&mut writer, study).await?;
     Ok(tagged(request.done(&app, writer, &view).await?, revision))
 }
 
@@ -337,7 +337,7 @@ pub(super) async fn extend(
     tag = "studies",
     params(("id" = StudyId, Path, description = "Identifier of the study")),
     request_body(content = StudyClone, description = "Optional: the fields that differ from the parent"),
-    responses((status = 201, description = "New study", body = StudyView)),
+    responses((status = 201, description = "New study", body = StudyWithCommands)),
     security(("token" = ["run"]), ("session" = ["run"])),
 )]
 pub(super) async fn clone_study(
@@ -360,6 +360,6 @@ async fn made(
     study: studies::Study,
 ) -> Result<Response, Refusal> {
     let (location, revision) = (format!("/api/v1/studies/{}", study.id), study.revision);
-    let view = StudyView::of(&mut writer, study).await?;
+    let view = StudyWithCommands::of(&mut writer, study).await?;
     Ok(tagged(request.created(app, writer, location, &view).await?, revision))
 }

@@ -20,6 +20,7 @@ use utoipa::ToSchema;
 
 /// Caller of the request.
 #[derive(Debug, Serialize, ToSchema)]
+#[schema(as = Caller)]
 pub(super) struct CurrentUser {
     /// Name of the user or the token.
     name: String,

@@ -5,7 +5,7 @@ use gait_optimizer::emg::{CHANNELS, CycleActivity, CycleStart, muscle_of};
 use gait_optimizer::limit_cycle::JOINTS;
 use gaitwright_charts::gait_charts;
 use gaitwright_charts::{Chart, Figure, Stroke};
-use gaitwright_service::studies::lab::{EmgView, LabSessionView, LimitCycles, WalkCondition};
+use gaitwright_service::studies::lab::{LabSessionView, LimitCycles, ProcessedEmg, WalkCondition};
 
 /// Names of the joints, in the order of [`JOINTS`] and of the gait's coordinates after the hip position.
 const JOINT_NAMES: [&str; 7] =
@@ -47,7 +47,7 @@ fn cycle(activity: &CycleActivity) -> &'static str {
 
 /// Muscle activity over the gait cycle (figure 6 of the paper): a chart for each channel with mean and standard deviation
 /// of each walk, and the activation of the model after unblinding.
-pub(crate) fn emg(session: &LabSessionView, emg: &EmgView) -> Vec<Figure> {
+pub(crate) fn emg(session: &LabSessionView, emg: &ProcessedEmg) -> Vec<Figure> {
     let Some(normal) = emg.result.walks.first() else { return Vec::new() };
     let chart = |(place, channel): (usize, &CycleActivity)| {
         let mut chart = Chart::new(

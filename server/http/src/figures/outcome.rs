@@ -3,7 +3,7 @@
 use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
 use gaitwright_service::studies::analysis::Analyses;
-use gaitwright_service::studies::history::{self, Milestone};
+use gaitwright_service::studies::history::{self, HistoryEntry};
 use gaitwright_service::studies::pending_comparison::{PendingComparison, awaited_comparison};
 use gaitwright_service::studies::recommended_trial::{last_known_best, ranking_to_show};
 use gaitwright_service::studies::snapshot::StudySnapshot;
@@ -20,7 +20,7 @@ pub(crate) struct StudyOutcome {
     /// The gaits from best to worst.
     pub(crate) ranking: Vec<TrialId>,
     /// The best action by iteration.
-    history: Vec<Milestone>,
+    history: Vec<HistoryEntry>,
     /// Whether people are asked to compare two gaits.
     pub(crate) comparison_pending: bool,
     /// The trial whose certificate the next comparison waits for.
@@ -65,7 +65,7 @@ impl StudyOutcome {
 
     /// Gait RMSE of the best action by iteration.
     pub(crate) fn course(&self) -> Vec<(f64, f64)> {
-        let point = |milestone: &Milestone| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
+        let point = |milestone: &HistoryEntry| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
         self.history.iter().filter_map(point).collect()
     }
 }

@@ -1,8 +1,8 @@
 //! The guides of the repository, embedded into the binary, so that a lab without internet has them.
 
+use crate::error_page_reader::RespondedTo;
 use crate::page_error::{PageResult, page};
 use crate::problem_details::Refusal;
-use crate::responded_to::RespondedTo;
 use askama::Template;
 use axum::Extension;
 use axum::extract::Path;

@@ -23,7 +23,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::access::{Administer, Caller, Read, RequiredRight, Run};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lab::{
-    self, EmgView, LabSessionState, LabSessionView, MeasurementFormat, WalkActivity, WalkCondition, WalkView,
+    self, LabSessionState, LabSessionView, MeasurementFormat, ProcessedEmg, WalkActivity, WalkCondition, WalkView,
 };
 use gaitwright_store::measurement_files::{self, MeasurementFile, MeasurementKind};
 use gaitwright_store::studies::Study;
@@ -91,7 +91,7 @@ struct MeasuredActivity {
 }
 
 impl MeasuredActivity {
-    fn of(session: &LabSessionView, emg: &EmgView, mut charts: Vec<PageChart>) -> Self {
+    fn of(session: &LabSessionView, emg: &ProcessedEmg, mut charts: Vec<PageChart>) -> Self {
         let legend = shared_legend(&mut charts);
         let EmgSettings { band_low_hz, band_high_hz, envelope_hz, order } = emg.result.settings;
         let strides = |walk: &WalkActivity| {

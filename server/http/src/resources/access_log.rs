@@ -5,8 +5,9 @@ use gaitwright_store::{Instant, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Row of the access log.
+/// Entry of the access log.
 #[derive(Debug, Serialize, ToSchema)]
+#[schema(as = AccessLogEntry)]
 pub(crate) struct AccessRow {
     /// Sequence number.
     seq: i64,

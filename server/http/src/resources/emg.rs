@@ -159,16 +159,16 @@ impl From<lab::WalkModel> for WalkModel {
 
 /// Processed EMG of a session, with the model's muscle activity.
 #[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct EmgView {
+pub(crate) struct ProcessedEmg {
     /// Measured activity.
     result: EmgResult,
     /// Muscle activity of the model. Empty while the session is blinded, and for gaits without muscles.
     model: Vec<WalkModel>,
 }
 
-impl From<lab::EmgView> for EmgView {
-    fn from(view: lab::EmgView) -> Self {
-        let lab::EmgView { result, model } = view;
+impl From<lab::ProcessedEmg> for ProcessedEmg {
+    fn from(view: lab::ProcessedEmg) -> Self {
+        let lab::ProcessedEmg { result, model } = view;
         Self { result: result.into(), model: model.into_iter().map(Into::into).collect() }
     }
 }

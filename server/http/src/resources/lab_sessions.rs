@@ -65,6 +65,7 @@ impl From<lab::WalkView> for WalkView {
 
 /// Lab session, without blinded data.
 #[derive(Debug, Serialize, ToSchema)]
+#[schema(as = LabSession)]
 pub(crate) struct LabSessionView {
     /// Identifier.
     id: LabSessionId,

@@ -35,9 +35,9 @@ pub(crate) struct Correction {
     /// Sequence number.
     seq: i64,
     /// Body height before the correction, m.
-    former_height_m: f64,
+    previous_height_m: f64,
     /// Body mass before the correction, kg.
-    former_body_mass_kg: f64,
+    previous_body_mass_kg: f64,
     /// Corrected body height, m.
     height_m: f64,
     /// Corrected body mass, kg.
@@ -53,8 +53,8 @@ pub(crate) struct Correction {
 impl From<subjects::Correction> for Correction {
     fn from(row: subjects::Correction) -> Self {
         let subjects::Correction { seq, former, height_m, body_mass_kg, reason, actor, created_at } = row;
-        let (former_height_m, former_body_mass_kg) = (former.height_m, former.body_mass_kg);
-        Self { seq, former_height_m, former_body_mass_kg, height_m, body_mass_kg, reason, actor, created_at }
+        let (previous_height_m, previous_body_mass_kg) = (former.height_m, former.body_mass_kg);
+        Self { seq, previous_height_m, previous_body_mass_kg, height_m, body_mass_kg, reason, actor, created_at }
     }
 }
 

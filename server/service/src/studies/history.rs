@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 /// The recommendation after one iteration of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
-pub struct Milestone {
+pub struct HistoryEntry {
     /// Number of results so far, from 1.
     pub iteration: u32,
     /// Best trial after this iteration of the study.
@@ -55,12 +55,12 @@ fn results_before(labelled: &[(Instant, &Trial)], proposed: &Trial) -> usize {
 /// The best trial after each iteration. Each proposal names the best trial after the
 /// results at that time; `best` is the current one. Before the first proposal with a best trial, the first gait counts
 /// as the best.
-pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
+pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<HistoryEntry> {
     let labelled = labelled(snapshot);
     let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let milestone = |results: usize, id: TrialId| {
         let best = by_id.get(&id).filter(|best| best.state == TrialState::Converged)?;
-        Some(Milestone {
+        Some(HistoryEntry {
             iteration: u32::try_from(results).ok()?,
             trial_id: id,
             number: best.number,
@@ -68,7 +68,7 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
             cost_of_transport: best.cost_of_transport,
         })
     };
-    let mut milestones: Vec<Milestone> = Vec::new();
+    let mut milestones: Vec<HistoryEntry> = Vec::new();
     let first = labelled.iter().position(|(_, trial)| trial.state == TrialState::Converged);
     milestones.extend(first.and_then(|index| milestone(index + 1, labelled[index].1.id)));
     let proposed = snapshot.trials.iter();
@@ -89,9 +89,9 @@ pub fn of(snapshot: &StudySnapshot, best: Option<TrialId>) -> Vec<Milestone> {
 
 /// Adds the iterations after which the learner was not asked, because the next trial was proposed before. There the best
 /// trial stays, unless Gait RMSE decides and the result is better.
-fn at_every_iteration(asked: &[Milestone], labelled: &[(Instant, &Trial)], rmse_decides: bool) -> Vec<Milestone> {
+fn at_every_iteration(asked: &[HistoryEntry], labelled: &[(Instant, &Trial)], rmse_decides: bool) -> Vec<HistoryEntry> {
     let Some(first) = asked.first() else { return Vec::new() };
-    let mut all: Vec<Milestone> = Vec::with_capacity(labelled.len());
+    let mut all: Vec<HistoryEntry> = Vec::with_capacity(labelled.len());
     let mut best = *first;
     for (iteration, (_, trial)) in (1_u32..).zip(labelled).filter(|(iteration, _)| *iteration >= first.iteration) {
         if let Ok(place) = asked.binary_search_by_key(&iteration, |milestone| milestone.iteration) {
@@ -101,7 +101,7 @@ fn at_every_iteration(asked: &[Milestone], labelled: &[(Instant, &Trial)], rmse_
             && let (Some(new), Some(old)) = (trial.gait_rmse_rad, best.gait_rmse_rad)
             && new < old
         {
-            best = Milestone {
+            best = HistoryEntry {
                 trial_id: trial.id,
                 number: trial.number,
                 gait_rmse_rad: trial.gait_rmse_rad,
@@ -109,17 +109,17 @@ fn at_every_iteration(asked: &[Milestone], labelled: &[(Instant, &Trial)], rmse_
                 ..best
             };
         }
-        all.push(Milestone { iteration, ..best });
+        all.push(HistoryEntry { iteration, ..best });
     }
     all
 }
 
 /// The history from the stored proposals alone, without the learner. Assumes that trials ran one at a time.
-pub fn known(snapshot: &StudySnapshot) -> Vec<Milestone> {
+pub fn known(snapshot: &StudySnapshot) -> Vec<HistoryEntry> {
     let by_id: HashMap<TrialId, &Trial> = snapshot.trials.iter().map(|trial| (trial.id, trial)).collect();
     let best_before = |trial: &Trial| {
         let best = by_id.get(&trial.best_before?).filter(|best| best.state == TrialState::Converged)?;
-        Some(Milestone {
+        Some(HistoryEntry {
             iteration: trial.number - 1,
             trial_id: best.id,
             number: best.number,

@@ -3,7 +3,7 @@
 use gait_optimizer::{Gait, ReferenceGait};
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_service::studies::certified_best::CertificateState;
-use gaitwright_service::studies::history::Milestone;
+use gaitwright_service::studies::history::HistoryEntry;
 
 /// The five coordinates of Gait RMSE.
 pub(super) const COORDINATES: [&str; 5] = ["torso", "hip_L", "knee_L", "ankle_L", "hip_R"];
@@ -84,10 +84,10 @@ impl ReproducedStudy {
 }
 
 /// Fills the iterations between milestones. A recommendation holds until the next one.
-pub(super) fn by_iteration(milestones: &[Milestone], results: usize) -> Vec<Option<f64>> {
+pub(super) fn by_iteration(milestones: &[HistoryEntry], results: usize) -> Vec<Option<f64>> {
     (1..=results)
         .map(|iteration| {
-            let before = |m: &&Milestone| m.iteration as usize <= iteration;
+            let before = |m: &&HistoryEntry| m.iteration as usize <= iteration;
             milestones.iter().rfind(before).and_then(|m| m.gait_rmse_rad)
         })
         .collect()
@@ -326,7 +326,7 @@ mod tests {
 
     #[test]
     fn recommendation_holds_until_the_next_one() {
-        let milestone = |iteration, rmse| Milestone {
+        let milestone = |iteration, rmse| HistoryEntry {
             iteration,
             trial_id: gaitwright_store::TrialId::fresh(),
             number: iteration,

@@ -9,9 +9,9 @@ from typing import Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
+    Caller,
     CreatedRaterInvitation,
     CreatedToken,
-    CurrentUser,
     Member,
     MemberId,
     NewMember,
@@ -36,12 +36,12 @@ from ..unpack import Unpack
 class AccessMethods(Transport):
     """Operations with the tag `access`."""
 
-    def get_caller(self) -> CurrentUser:
+    def get_caller(self) -> Caller:
         """Get the caller.
 
         Name, role and rights of the caller.
         """
-        return cast(CurrentUser, self.request_json("GET", "/api/v1/me"))
+        return cast(Caller, self.request_json("GET", "/api/v1/me"))
 
     def list_sessions(self, *, page_size: Optional[int] = None) -> Pages[Session]:
         """List sign-in sessions.

@@ -11,12 +11,11 @@ from ..paging import Pages
 from ..schemas import (
     ControllerFile,
     EmgProcessing,
-    EmgView,
+    LabSession,
     LabSessionClosing,
     LabSessionId,
     LabSessionProgress,
     LabSessionUnblinding,
-    LabSessionView,
     LimitCycles,
     MeasurementFile,
     MeasurementFileId,
@@ -24,6 +23,7 @@ from ..schemas import (
     NewJointAngles,
     NewLabAnswer,
     NewLabSession,
+    ProcessedEmg,
     RecordedWalk,
     StudyId,
 )
@@ -34,12 +34,12 @@ from ..unpack import Unpack
 class LabMethods(Transport):
     """Operations with the tag `lab`."""
 
-    def get_lab_session(self, lab_session_id: LabSessionId) -> LabSessionView:
+    def get_lab_session(self, lab_session_id: LabSessionId) -> LabSession:
         """Get a lab session.
 
         The response omits blinded data.
         """
-        return cast(LabSessionView, self.request_json("GET", "/api/v1/lab-sessions/{id}", {"id": lab_session_id}))
+        return cast(LabSession, self.request_json("GET", "/api/v1/lab-sessions/{id}", {"id": lab_session_id}))
 
     def answer_lab_session(
         self,
@@ -72,7 +72,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[LabSessionClosing],
-    ) -> LabSessionView:
+    ) -> LabSession:
         """Close a lab session.
 
         A closed session accepts no more data except safety reports.
@@ -80,7 +80,7 @@ class LabMethods(Transport):
         Fields: optionally note.
         """
         return cast(
-            LabSessionView,
+            LabSession,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/close",
@@ -117,13 +117,20 @@ class LabMethods(Transport):
             ),
         )
 
-    def get_emg_results(self, lab_session_id: LabSessionId) -> EmgView:
-        """Get the processed EMG.
+    def get_emg_result(self, lab_session_id: LabSessionId) -> ProcessedEmg:
+        """Get the newest EMG result.
 
         The newest result. After unblinding, includes the muscle activity of the model. Without a result, the status is
         404.
         """
-        return cast(EmgView, self.request_json("GET", "/api/v1/lab-sessions/{id}/emg-results", {"id": lab_session_id}))
+        return cast(
+            ProcessedEmg,
+            self.request_json(
+                "GET",
+                "/api/v1/lab-sessions/{id}/emg-results",
+                {"id": lab_session_id},
+            ),
+        )
 
     def create_emg_result(
         self,
@@ -131,7 +138,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[EmgProcessing],
-    ) -> EmgView:
+    ) -> ProcessedEmg:
         """Create an EMG result.
 
         Filters, segments and normalises the newest EMG recording of each walk. Can be repeated with other settings.
@@ -139,7 +146,7 @@ class LabMethods(Transport):
         Fields: optionally settings.
         """
         return cast(
-            EmgView,
+            ProcessedEmg,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/emg-results",
@@ -261,7 +268,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[LabSessionUnblinding],
-    ) -> LabSessionView:
+    ) -> LabSession:
         """Unblind a lab session.
 
         Reveals to everyone who can access the study which gait each walk used. The audit trail records the unblinding,
@@ -270,7 +277,7 @@ class LabMethods(Transport):
         Fields: reason.
         """
         return cast(
-            LabSessionView,
+            LabSession,
             self.request_json(
                 "POST",
                 "/api/v1/lab-sessions/{id}/unblind",
@@ -322,7 +329,7 @@ class LabMethods(Transport):
         """
         return self.request_text("GET", "/api/v1/measurement-files/{id}/content", {"id": measurement_file_id})
 
-    def list_lab_sessions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[LabSessionView]:
+    def list_lab_sessions(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[LabSession]:
         """List lab sessions of a study.
 
         The response omits blinded data. Sorted by number.
@@ -335,7 +342,7 @@ class LabMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[NewLabSession],
-    ) -> LabSessionView:
+    ) -> LabSession:
         """Create a lab session.
 
         The session consists of a walk without the device, then one with each gait. The order of the gaits is drawn at
@@ -344,7 +351,7 @@ class LabMethods(Transport):
         Fields: trial_a, trial_b; optionally notes.
         """
         return cast(
-            LabSessionView,
+            LabSession,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/lab-sessions",

@@ -9,8 +9,8 @@ from typing import Optional, cast
 
 from ..paging import Pages
 from ..schemas import (
-    AccessRow,
-    AuditRow,
+    AccessLogEntry,
+    AuditEntry,
     Backup,
     BackupId,
     Job,
@@ -31,7 +31,7 @@ class OperationMethods(Transport):
         text: Optional[str] = None,
         subject_id: Optional[SubjectId] = None,
         page_size: Optional[int] = None,
-    ) -> Pages[AccessRow]:
+    ) -> Pages[AccessLogEntry]:
         """List the access log.
 
         Views and exports of subjects' data, and refusals, newest first.
@@ -42,7 +42,7 @@ class OperationMethods(Transport):
         """
         return Pages(self, "/api/v1/access-log", query={"text": text, "subject_id": subject_id, "limit": page_size})
 
-    def list_audit_trail(self, *, text: Optional[str] = None, page_size: Optional[int] = None) -> Pages[AuditRow]:
+    def list_audit_trail(self, *, text: Optional[str] = None, page_size: Optional[int] = None) -> Pages[AuditEntry]:
         """List the audit trail.
 
         Every change by a user or a program, newest first.

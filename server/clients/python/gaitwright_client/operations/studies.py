@@ -11,8 +11,8 @@ from typing import Optional, cast
 from ..events import Event, follow
 from ..paging import Pages
 from ..schemas import (
+    HistoryEntry,
     Import,
-    Milestone,
     NewStudy,
     Recommendation,
     StateChangeReason,
@@ -22,7 +22,7 @@ from ..schemas import (
     StudyExtension,
     StudyId,
     StudyState,
-    StudyView,
+    StudyWithCommands,
     SubjectId,
 )
 from ..transport import Transport
@@ -41,7 +41,7 @@ class StudiesMethods(Transport):
         state: Optional[StudyState] = None,
         archived: Optional[bool] = None,
         page_size: Optional[int] = None,
-    ) -> Pages[StudyView]:
+    ) -> Pages[StudyWithCommands]:
         """List studies.
 
         Newest first.
@@ -62,7 +62,7 @@ class StudiesMethods(Transport):
             query={"subject_id": subject_id, "text": text, "tag": tag, "state": state, "archived": archived, "limit": page_size},
         )
 
-    def create_study(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewStudy]) -> StudyView:
+    def create_study(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewStudy]) -> StudyWithCommands:
         """Create a study.
 
         Starts the study, unless `start` is false.
@@ -72,14 +72,14 @@ class StudiesMethods(Transport):
         search_space, seed, simulated_walks, solve_options, solve_seconds_budget, start, unchanged_limit,
         warm_start_from.
         """
-        return cast(StudyView, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
+        return cast(StudyWithCommands, self.request_json("POST", "/api/v1/studies", body=body, key=idempotency_key))
 
-    def get_study(self, study_id: StudyId) -> StudyView:
+    def get_study(self, study_id: StudyId) -> StudyWithCommands:
         """Get a study.
 
         The ETag is the revision of the study.
         """
-        return cast(StudyView, self.request_json("GET", "/api/v1/studies/{id}", {"id": study_id}))
+        return cast(StudyWithCommands, self.request_json("GET", "/api/v1/studies/{id}", {"id": study_id}))
 
     def update_study(
         self,
@@ -88,7 +88,7 @@ class StudiesMethods(Transport):
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StudyChange],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Update a study.
 
         Changes the name, tags, notes, priority, number of parallel trials or archived state. Absent fields keep their
@@ -97,7 +97,7 @@ class StudiesMethods(Transport):
         Fields: optionally archived, name, notes, parallel_trials, priority, tags.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "PATCH",
                 "/api/v1/studies/{id}",
@@ -121,7 +121,7 @@ class StudiesMethods(Transport):
         *,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StudyClone],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Clone a study.
 
         Creates a study with the same set-up, without the trials.
@@ -129,7 +129,7 @@ class StudiesMethods(Transport):
         Fields: optionally answer_source, muscles, name, number_of_trials, seed, start.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/clone",
@@ -157,7 +157,7 @@ class StudiesMethods(Transport):
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StudyExtension],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Extend a study.
 
         If the study has ended, it resumes.
@@ -165,7 +165,7 @@ class StudiesMethods(Transport):
         Fields: number_of_trials.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/extend",
@@ -176,7 +176,7 @@ class StudiesMethods(Transport):
             ),
         )
 
-    def list_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[Milestone]:
+    def list_study_history(self, study_id: StudyId, *, page_size: Optional[int] = None) -> Pages[HistoryEntry]:
         """List the history of the recommendation.
 
         The best trial after each iteration of the study, that is, after each result. Sorted by iteration.
@@ -205,7 +205,7 @@ class StudiesMethods(Transport):
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StateChangeReason],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Pause a study.
 
         Running solves finish, and no new one starts.
@@ -213,7 +213,7 @@ class StudiesMethods(Transport):
         Fields: optionally reason.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/pause",
@@ -245,7 +245,7 @@ class StudiesMethods(Transport):
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StateChangeReason],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Resume a study.
 
         Possible while the study is `paused`.
@@ -253,7 +253,7 @@ class StudiesMethods(Transport):
         Fields: optionally reason.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/resume",
@@ -271,7 +271,7 @@ class StudiesMethods(Transport):
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StateChangeReason],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Start a study.
 
         Possible while the study is `not_started`.
@@ -279,7 +279,7 @@ class StudiesMethods(Transport):
         Fields: optionally reason.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/start",
@@ -297,7 +297,7 @@ class StudiesMethods(Transport):
         revision: Optional[int] = None,
         idempotency_key: Optional[str] = None,
         **body: Unpack[StateChangeReason],
-    ) -> StudyView:
+    ) -> StudyWithCommands:
         """Stop a study.
 
         Cancels open trials.
@@ -305,7 +305,7 @@ class StudiesMethods(Transport):
         Fields: optionally reason.
         """
         return cast(
-            StudyView,
+            StudyWithCommands,
             self.request_json(
                 "POST",
                 "/api/v1/studies/{id}/stop",

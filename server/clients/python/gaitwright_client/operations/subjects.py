@@ -138,7 +138,7 @@ class SubjectsMethods(Transport):
             ),
         )
 
-    def list_nearest_reference_gaits(
+    def list_reference_gaits_by_distance(
         self,
         subject_id: SubjectId,
         *,

@@ -217,7 +217,7 @@ class TrialsMethods(Transport):
         """Download the gait of a trial as CSV."""
         return self.request_text("GET", "/api/v1/trials/{id}/gait.csv", {"id": trial_id})
 
-    def get_gait_motion_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> str:
+    def get_opensim_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> str:
         """Download the gait as an OpenSim motion file.
 
         rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
@@ -240,7 +240,7 @@ class TrialsMethods(Transport):
         """
         return Pages(self, "/api/v1/trials/{id}/local-optima", {"id": trial_id}, query={"limit": page_size})
 
-    def get_gait_motion(self, trial_id: TrialId) -> GaitMotion:
+    def get_stick_figures(self, trial_id: TrialId) -> GaitMotion:
         """Get the motion of a gait.
 
         Stick figures over one stride, for an animation.

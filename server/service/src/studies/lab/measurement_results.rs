@@ -120,7 +120,7 @@ pub struct WalkModel {
 
 /// Processed EMG of a session, with the model's muscle activity.
 #[derive(Debug, Clone, PartialEq)]
-pub struct EmgView {
+pub struct ProcessedEmg {
     /// Measured activity.
     pub result: EmgResult,
     /// Muscle activity of the model. Empty while the session is blinded, and for gaits without muscles.
@@ -131,7 +131,7 @@ pub struct EmgView {
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>, Error> {
+pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<ProcessedEmg>, Error> {
     let mut db = store.read().await?;
     let Some(result) = measurement_files::newest_result::<EmgResult>(&mut db, id).await? else { return Ok(None) };
     drop(db);
@@ -142,7 +142,7 @@ pub async fn emg(store: &mut Store, id: LabSessionId) -> Result<Option<EmgView>,
 ///
 /// # Errors
 /// Errors of the database.
-pub async fn with_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<EmgView, Error> {
+pub async fn with_model(store: &mut Store, id: LabSessionId, result: EmgResult) -> Result<ProcessedEmg, Error> {
     let mut db = store.read().await?;
     let mut gaits = Vec::new();
     for walk in &result.walks {
@@ -153,7 +153,7 @@ pub async fn with_model(store: &mut Store, id: LabSessionId, result: EmgResult) 
 }
 
 /// Combines a result with the model's muscle activity.
-fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Result<EmgView, Error> {
+fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Result<ProcessedEmg, Error> {
     let mut model = Vec::new();
     for (number, gait) in gaits {
         let gait = gait.unpack(pool)?;
@@ -163,7 +163,7 @@ fn view(pool: &OnPool, result: EmgResult, gaits: &[(u8, Packed<Gait>)]) -> Resul
             model.push(WalkModel { walk: *number, muscles });
         }
     }
-    Ok(EmgView { result, model })
+    Ok(ProcessedEmg { result, model })
 }
 
 /// The gait of a walk. `None` without the device, while the session is blinded, and if the trajectory was pruned.

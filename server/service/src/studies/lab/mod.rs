@@ -32,7 +32,7 @@ pub use file_format::{C3D_FILE, MeasurementFormat, check_not_c3d};
 pub use foot_strikes::FootStrikes;
 pub use joint_angle_preview::JointAnglePreview;
 pub use measurement_results::{
-    EmgResult, EmgView, LimitCycles, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
+    EmgResult, LimitCycles, ProcessedEmg, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
     with_model,
 };
 pub use question::{AnswerView, WALKS};
