@@ -11,6 +11,10 @@ use serde_json::Value;
 /// Name and label of each field of a form, in its order.
 pub(crate) type FieldLabels = &'static [(&'static str, &'static str)];
 
+/// A form without an entry that the page, not a person, puts into it.
+pub(crate) const INCOMPLETE_FORM: &str = "The form was not sent completely, and nothing was changed. Load the page with the \
+                                          form again, then send the form.";
+
 /// The refusal of a field that the form does not have.
 pub(crate) fn unknown_field(name: &str) -> FieldError {
     FieldError::in_words(name, &format!("The form has no field {name}."))
@@ -39,6 +43,12 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
     };
     let sentence = FieldError::sentence(&quoted(label), given.as_deref(), allowed);
     near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
+}
+
+/// A refusal of a field that has no label, because no person fills it in.
+pub(crate) fn without_label(fault: &FieldError) -> String {
+    // Other sentences are about a form as a whole; this one would name the field and its identifiers.
+    if fault.allowed.is_some() { INCOMPLETE_FORM.to_owned() } else { fault.message.clone() }
 }
 
 /// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
@@ -80,7 +90,7 @@ fn labelled(fault: &FieldError, labels: FieldLabels) -> String {
     // A form shows a field of a part of the request, such as `reading.rate_hz`, without the part.
     let name = fault.field.rsplit('.').next().unwrap_or_default();
     let found = labels.iter().find(|(field, _)| *field == name);
-    found.map_or_else(|| fault.message.clone(), |(_, label)| of_field(label, fault))
+    found.map_or_else(|| without_label(fault), |(_, label)| of_field(label, fault))
 }
 
 #[cfg(test)]
@@ -95,6 +105,14 @@ mod tests {
         assert_eq!(labelled(&fault, FILE), "File contents, line 1: the first column is \"t\"");
         let fault = FieldError::in_words("recording", "recording: column \"RF_L\" is missing");
         assert_eq!(labelled(&fault, FILE), "File contents: column \"RF_L\" is missing");
+    }
+
+    #[test]
+    fn refusal_without_a_label_names_no_field() {
+        let hidden = labelled(&FieldError::new("key", "x", "an identifier from this form"), FILE);
+        assert_eq!(hidden, INCOMPLETE_FORM);
+        let sentence = FieldError::in_words("", "The two gaits are equal.");
+        assert_eq!(labelled(&sentence, FILE), "The two gaits are equal.");
     }
 
     #[test]
