@@ -32,7 +32,13 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
         let rest = fault.message.strip_prefix(&fault.field).filter(|rest| rest.starts_with([':', ',']));
         return rest.map_or_else(|| fault.message.clone(), |rest| format!("{label}{rest}"));
     };
-    let given = match &fault.value {
+    let sentence = FieldError::sentence(&quoted(label), given(fault).as_deref(), allowed);
+    near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
+}
+
+/// The refused value as the form shows it.
+fn given(fault: &FieldError) -> Option<String> {
+    match &fault.value {
         // The form shows names in place of identifiers.
         Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => Some(quoted(text)),
         Some(Value::Number(number)) => {
@@ -40,15 +46,20 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
             Some(text.strip_suffix(".0").unwrap_or(&text).to_owned())
         }
         _ => None,
-    };
-    let sentence = FieldError::sentence(&quoted(label), given.as_deref(), allowed);
-    near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
+    }
 }
+
+/// What a page calls a field that has no label.
+pub(crate) const WITHOUT_LABEL: &str = "This entry";
 
 /// A refusal of a field that has no label, because no person fills it in.
 pub(crate) fn without_label(fault: &FieldError) -> String {
-    // Other sentences are about a form as a whole; this one would name the field and its identifiers.
-    if fault.allowed.is_some() { INCOMPLETE_FORM.to_owned() } else { fault.message.clone() }
+    match (&fault.allowed, &fault.value) {
+        // A sentence of its own is about the form as a whole.
+        (None, _) => fault.message.clone(),
+        (Some(_), Some(Value::String(text))) if text.is_empty() => INCOMPLETE_FORM.to_owned(),
+        (Some(allowed), _) => FieldError::sentence(WITHOUT_LABEL, given(fault).as_deref(), allowed),
+    }
 }
 
 /// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
@@ -109,8 +120,9 @@ mod tests {
 
     #[test]
     fn refusal_without_a_label_names_no_field() {
-        let hidden = labelled(&FieldError::new("key", "x", "an identifier from this form"), FILE);
-        assert_eq!(hidden, INCOMPLETE_FORM);
+        let hidden = |given: &str| labelled(&FieldError::new("key", given, "an identifier from this form"), FILE);
+        assert_eq!(hidden(""), INCOMPLETE_FORM);
+        assert_eq!(hidden("x"), "This entry is \u{201c}x\u{201d}; it must be an identifier from this form.");
         let sentence = FieldError::in_words("", "The two gaits are equal.");
         assert_eq!(labelled(&sentence, FILE), "The two gaits are equal.");
     }
