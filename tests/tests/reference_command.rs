@@ -44,7 +44,7 @@ fn reference_command_refuses_columns_by_the_rules_of_the_page() {
     let folder = recording();
     let unit = ["--unit", "degrees"];
     for (arguments, said) in [
-        (&["--columns", COLUMNS][..], "--unit"),
+        (&["--columns", COLUMNS][..], "Give the unit of the angles: degrees or radians."),
         (&["--columns", "elbow=Trunk", unit[0], unit[1]], "--columns is \"elbow\"; it must be one of torso, hip_L"),
         (&["--columns", "torso=Trunk,torso=L Hip"], "--columns is \"torso\"; it must be given once for each angle."),
         (&["--columns", "torso=Trunk,hip_L=Trunk", unit[0], unit[1]], "Column \"Trunk\" is chosen for both"),
