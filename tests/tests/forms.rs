@@ -583,6 +583,42 @@ async fn angles_of_bounds_are_degrees_on_pages_and_radians_in_rest() {
 }
 
 #[tokio::test]
+async fn angle_without_unit_that_may_be_radians_is_refused_with_both_meanings() {
+    let (_folder, service) = service().await;
+    let subject = service.subject().await;
+    let body = format!("{STUDY}&subject={subject}&number_of_trials=1&seed=1&values_a5=0,0.02");
+    let doubtful = format!("{body}&tuned_a6=on&values_a6=0,.3&lengthscale_a6=5.73&fixed_a1=80");
+    let refused = service.post_text("/studies/new", FORM, &doubtful).await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "2 fields need correcting");
+    for says in [
+        "Values of a6: .3 has no unit. Did you mean 17.2° (.3 rad)? If you mean .3 degrees, write .3°.",
+        "Fixed value of a1: 80 has no unit. Did you mean 4584 °/s (80 rad/s)?",
+        "name=\"values_a6\" value=\"0,.3\"",
+    ] {
+        assert!(refused.text.contains(says), "{says}: {}", refused.text);
+    }
+    let clear = "&tuned_a6=on&values_a6=0.3°,0.5+deg,0.1+rad&lengthscale_a6=0.01+rad&fixed_a1=80+°/s";
+    let study = made(&service.post_text("/studies/new", FORM, &format!("{body}{clear}")).await);
+    let plan = service.get(study).await.plan;
+    let lean = plan.search_space.dimensions().iter().find(|dimension| dimension.name == "a6").unwrap();
+    let degrees: Vec<f64> = lean.values.iter().map(|value| (value.to_degrees() * 1e3).round() / 1e3).collect();
+    assert_eq!(degrees, [0.3, 0.5, 5.73]);
+
+    // What the form of a clone fills in is accepted unchanged.
+    let clone = service.fetch(&format!("/studies/new?like={study}")).await.text;
+    let filled_in = |field: &str| {
+        let input = clone.split(&format!("name=\"{field}\" value=\"")).nth(1).unwrap();
+        format!("&{field}={}", input.split('"').next().unwrap().replace(' ', "+"))
+    };
+    let typed: String = ["values_a6", "lengthscale_a6", "fixed_a1"].map(filled_in).concat();
+    assert!(typed.contains("0.3°") && typed.contains("80+°/s"), "{typed}");
+    let again = made(&service.post_text("/studies/new", FORM, &format!("{body}&tuned_a6=on{typed}")).await);
+    let again = service.get(again).await.plan;
+    assert_eq!((again.search_space, again.base_bounds), (plan.search_space, plan.base_bounds));
+    service.stop().await;
+}
+
+#[tokio::test]
 async fn comparison_of_studies_with_answers_of_people_leads_with_these_answers() {
     let (_folder, service) = service().await;
     let people = service.study(|new| (new.number_of_trials, new.answer_source) = (4, AnswerSource::People)).await;

@@ -3,7 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use axum::http::{Method, StatusCode};
+use axum::body::Body;
+use axum::http::{Method, Request, StatusCode, header};
 use gaitwright_service::access::Role;
 use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_store::trials::TrialState;
@@ -76,6 +77,38 @@ fn fault(form: &Form, answer: &Answer, labels: &[&str]) -> Option<String> {
     Some(format!("{label} is not named in {notice}"))
 }
 
+/// The address of a route without a form of its own here.
+fn with_names(route: &str, names: &[(&str, String)]) -> String {
+    let Some((start, name)) = names.iter().find(|(start, _)| route.starts_with(start)) else {
+        assert!(!route.contains('{'), "{route}: say which object its address names");
+        return route.to_owned();
+    };
+    route.replacen(start, &start.replace("{id}", name).replace("{code}", name).replace("{link}", name), 1)
+}
+
+/// Sends a form without a single entry, from the page `/page`.
+async fn send_from_page(service: &Service, path: &str) -> Answer {
+    let request = Request::post(path).header(header::CONTENT_TYPE, FORM).header(header::HOST, "localhost");
+    let request = request.header(header::REFERER, "http://localhost/page?of=1").body(Body::empty()).unwrap();
+    service.send(request).await
+}
+
+/// What makes an answer less than a page of the site, if anything.
+fn bare(answer: &Answer) -> Option<String> {
+    if answer.status == StatusCode::SEE_OTHER || answer.content_type().starts_with("application/json") {
+        return None;
+    }
+    let text = &answer.text;
+    // Pages of raters and for signing in have no navigation.
+    let parts = ["<!doctype html>", "href=\"/static/gaitwright.css\"", "<main", "<h1", "</html>"];
+    let has_layout = parts.iter().all(|part| text.contains(part));
+    // Every other status shows the page of the form itself.
+    let leads_back = answer.status != StatusCode::BAD_REQUEST || text.contains("href=\"/page?of=1\"");
+    let names_fields = text.contains("form field") || text.contains("missing field");
+    let is_page = answer.content_type().starts_with("text/html") && has_layout;
+    (!is_page || names_fields || !leads_back).then(|| format!("{} {text:.3000}", answer.status))
+}
+
 fn id(value: &Value) -> &str {
     value["id"].as_str().unwrap()
 }
@@ -119,6 +152,15 @@ async fn every_form_answers_refused_entries_with_itself_and_names_every_field() 
     let of_subject = |end: &str| format!("/subjects/{subject}{end}");
     let gait = |end: &str| format!("/trials/{one}{end}");
     let key = trials[0].id;
+    let names = [
+        ("/studies/{id}", study.to_string()),
+        ("/trials/{id}", one.to_string()),
+        ("/rate/{id}", human.to_string()),
+        ("/rate/pair/{code}", pair.rsplit('/').next().unwrap().to_owned()),
+        ("/lab/{id}", tablet.rsplit('/').next().unwrap().to_owned()),
+        ("/jobs/{id}", one.to_string()),
+        ("/sign-in/{link}", "nothing".to_owned()),
+    ];
 
     let forms = [
         Form {
@@ -343,13 +385,16 @@ async fn every_form_answers_refused_entries_with_itself_and_names_every_field() 
 
     // The nonsense first: an accepted empty entry changes what the page shows.
     let mut faults = Vec::new();
-    for (entry, what) in [(NONSENSE, "nonsense"), ("", "empty")] {
+    for (entry, what) in [(Some(NONSENSE), "nonsense"), (Some(""), "empty"), (None, "missing")] {
         for form in &forms {
-            let labels = if what == "empty" { form.empty } else { form.nonsense };
-            if labels.is_empty() {
+            let labels = if what == "nonsense" { form.nonsense } else { form.empty };
+            // Without the field for an author, a safety report is in the name of the user.
+            let is_complete = what == "missing" && form.route == "/trials/{id}/safety-report";
+            if labels.is_empty() || is_complete {
                 continue;
             }
-            let typed: Vec<String> = form.fields.iter().map(|field| format!("{field}={entry}")).collect();
+            let typed = |field: &&str| entry.map(|entry| format!("{field}={entry}"));
+            let typed: Vec<String> = form.fields.iter().filter_map(typed).collect();
             let body = format!("{}&{}", form.chosen, typed.join("&"));
             let answer = service.post_text(&form.path, FORM, body.trim_start_matches('&')).await;
             faults.extend(fault(form, &answer, labels).map(|fault| format!("{}, {what}: {fault}", form.route)));
@@ -367,6 +412,34 @@ async fn every_form_answers_refused_entries_with_itself_and_names_every_field() 
     }
     for (without, _) in WITHOUT_FIELDS {
         assert!(posts.iter().any(|route| route == without), "{without} is no form");
+    }
+    for route in &posts {
+        let form = forms.iter().find(|form| form.route == route);
+        let path = form.map_or_else(|| with_names(route, &names), |form| form.path.clone());
+        let answer = send_from_page(&service, &path).await;
+        faults.extend(bare(&answer).map(|fault| format!("{route} without a body: {fault}")));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n\n"));
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn form_without_an_entry_of_its_page_leads_back_to_that_page_and_nowhere_else() {
+    let (_folder, service) = callers::service().await;
+    let person = signed_in(&service, Role::Clinician).await;
+    let subject = service.subject().await;
+    let sent = async |referer: &str| {
+        let request = Request::post(format!("/subjects/{subject}/consent")).header(header::CONTENT_TYPE, FORM);
+        let request = request.header(header::HOST, "localhost").header(header::REFERER, referer);
+        service.send(callers::of(&person, request).body(Body::from("form=signed")).unwrap()).await
+    };
+    let answer = sent(&format!("http://localhost/subjects/{subject}")).await;
+    assert_eq!(answer.status, StatusCode::BAD_REQUEST, "{}", answer.text);
+    assert!(answer.text.contains("The form was not sent completely, and nothing was changed."), "{}", answer.text);
+    assert!(answer.text.contains(&format!("<a href=\"/subjects/{subject}\">Back to the form</a>")), "{}", answer.text);
+    for foreign in ["http://elsewhere.example/subjects", "http://localhost//elsewhere.example", "nonsense"] {
+        let answer = sent(foreign).await;
+        assert!(!answer.text.contains("Back to the form") && !answer.text.contains("elsewhere"), "{}", answer.text);
     }
     service.stop().await;
 }

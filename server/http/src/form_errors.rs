@@ -11,6 +11,10 @@ use serde_json::Value;
 /// Name and label of each field of a form, in its order.
 pub(crate) type FieldLabels = &'static [(&'static str, &'static str)];
 
+/// A form without an entry that the page, not a person, puts into it.
+pub(crate) const INCOMPLETE_FORM: &str = "The form was not sent completely, and nothing was changed. Load the page with the \
+                                          form again, then send the form.";
+
 /// The refusal of a field that the form does not have.
 pub(crate) fn unknown_field(name: &str) -> FieldError {
     FieldError::in_words(name, &format!("The form has no field {name}."))
@@ -28,7 +32,13 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
         let rest = fault.message.strip_prefix(&fault.field).filter(|rest| rest.starts_with([':', ',']));
         return rest.map_or_else(|| fault.message.clone(), |rest| format!("{label}{rest}"));
     };
-    let given = match &fault.value {
+    let sentence = FieldError::sentence(&quoted(label), given(fault).as_deref(), allowed);
+    near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
+}
+
+/// The refused value as the form shows it.
+fn given(fault: &FieldError) -> Option<String> {
+    match &fault.value {
         // The form shows names in place of identifiers.
         Some(Value::String(text)) if !text.is_empty() && text.parse::<TrialId>().is_err() => Some(quoted(text)),
         Some(Value::Number(number)) => {
@@ -36,9 +46,20 @@ pub(crate) fn of_field(label: &str, fault: &FieldError) -> String {
             Some(text.strip_suffix(".0").unwrap_or(&text).to_owned())
         }
         _ => None,
-    };
-    let sentence = FieldError::sentence(&quoted(label), given.as_deref(), allowed);
-    near_miss(fault).map_or_else(|| sentence.clone(), |meant| format!("{sentence} Did you mean {meant}?"))
+    }
+}
+
+/// What a page calls a field that has no label.
+pub(crate) const WITHOUT_LABEL: &str = "This entry";
+
+/// A refusal of a field that has no label, because no person fills it in.
+pub(crate) fn without_label(fault: &FieldError) -> String {
+    match (&fault.allowed, &fault.value) {
+        // A sentence of its own is about the form as a whole.
+        (None, _) => fault.message.clone(),
+        (Some(_), Some(Value::String(text))) if text.is_empty() => INCOMPLETE_FORM.to_owned(),
+        (Some(allowed), _) => FieldError::sentence(WITHOUT_LABEL, given(fault).as_deref(), allowed),
+    }
 }
 
 /// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
@@ -80,7 +101,7 @@ fn labelled(fault: &FieldError, labels: FieldLabels) -> String {
     // A form shows a field of a part of the request, such as `reading.rate_hz`, without the part.
     let name = fault.field.rsplit('.').next().unwrap_or_default();
     let found = labels.iter().find(|(field, _)| *field == name);
-    found.map_or_else(|| fault.message.clone(), |(_, label)| of_field(label, fault))
+    found.map_or_else(|| without_label(fault), |(_, label)| of_field(label, fault))
 }
 
 #[cfg(test)]
@@ -95,6 +116,15 @@ mod tests {
         assert_eq!(labelled(&fault, FILE), "File contents, line 1: the first column is \"t\"");
         let fault = FieldError::in_words("recording", "recording: column \"RF_L\" is missing");
         assert_eq!(labelled(&fault, FILE), "File contents: column \"RF_L\" is missing");
+    }
+
+    #[test]
+    fn refusal_without_a_label_names_no_field() {
+        let hidden = |given: &str| labelled(&FieldError::new("key", given, "an identifier from this form"), FILE);
+        assert_eq!(hidden(""), INCOMPLETE_FORM);
+        assert_eq!(hidden("x"), "This entry is \u{201c}x\u{201d}; it must be an identifier from this form.");
+        let sentence = FieldError::in_words("", "The two gaits are equal.");
+        assert_eq!(labelled(&sentence, FILE), "The two gaits are equal.");
     }
 
     #[test]

@@ -13,6 +13,7 @@ mod authorization;
 mod blind_motion;
 mod body_limits;
 mod body_measures;
+mod bound_entries;
 mod bound_units;
 mod browser_name;
 mod client_address;

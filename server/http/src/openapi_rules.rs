@@ -12,6 +12,7 @@ use super::openapi_solver_settings;
 use super::resources::document_schemas;
 use gait_learner::LearnerSettings;
 use gait_optimizer::emg::{CHANNELS, EmgSettings};
+use gait_optimizer::limit_cycle::JOINTS;
 use gait_optimizer::muscle::{MuscleOverride, MuscleParameters};
 use gait_optimizer::settings::Naturalness;
 use gait_optimizer::{Device, GaitSettings, LocalOptimumChoice, SolveOptions, Subject, TunedBounds};
@@ -126,6 +127,9 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
         }
         schemas.add("NewReferenceGait", "format", &json!({ "default": "opensim" }));
         schemas.add("EmgReading", "channels", &json!({ "propertyNames": { "enum": CHANNELS } }));
+        for component in ["JointAngleReading", "NewReferenceGait"] {
+            schemas.add(component, "columns", &json!({ "propertyNames": { "enum": JOINTS } }));
+        }
         schemas.add("JointAngleReading", "cutoff_hz", &json!({ "minimum": 0.5 }));
         state_emg(schemas);
         let bounds = json!({ "propertyNames": { "enum": TunedBounds::NAMES }, "minProperties": 1 });

@@ -25,6 +25,8 @@ struct ErrorPage {
     problem: Problem,
     /// The reader's role decides the navigation; `None` shows none.
     to: Option<RespondedTo>,
+    /// The address of the page with the refused form.
+    back: Option<String>,
 }
 
 impl IntoResponse for PageError {
@@ -67,7 +69,7 @@ fn title(status: StatusCode, detail: &str) -> Option<&'static str> {
 }
 
 /// Renders a problem as a page with the navigation of the caller.
-pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
+pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>, back: Option<String>) -> Response {
     let status = problem.status();
     let detail = match without_identifier(&problem.detail) {
         Some(detail) => detail,
@@ -77,7 +79,7 @@ pub(crate) fn shown(problem: Problem, to: Option<RespondedTo>) -> Response {
     };
     let title = title(status, &detail).unwrap_or(problem.title);
     let problem = Problem { title, detail, ..problem };
-    match (ErrorPage { problem, to }).render() {
+    match (ErrorPage { problem, to, back }).render() {
         Ok(text) => (status, Html(text)).into_response(),
         Err(_) => status.into_response(),
     }

@@ -1,5 +1,6 @@
 //! Reads query strings and submitted forms strictly, with errors that name parameter, value and what is allowed.
 
+use crate::form_errors::INCOMPLETE_FORM;
 use gaitwright_service::error::{Error, FieldError};
 use gaitwright_service::json_document;
 use serde::de::value::{Error as Refused, MapDeserializer, SeqDeserializer, StrDeserializer};
@@ -52,15 +53,32 @@ pub(crate) fn read<T: DeserializeOwned>(pairs: &Pairs) -> Result<T, Error> {
     read_from(pairs, "query parameter")
 }
 
-/// Reads the fields of a submitted form.
+/// Reads the fields of a submitted form. A missing field counts as an empty one, so that a page refuses it under its label.
 ///
 /// # Errors
-/// As [`read`], and [`Error::Malformed`].
+/// As [`read`], and [`Error::Malformed`], also if a missing field is one that no person fills in.
 pub(crate) fn read_form<T: DeserializeOwned>(body: &[u8]) -> Result<T, Error> {
-    let pairs: Pairs = serde_urlencoded::from_bytes(body)
+    let mut pairs: Pairs = serde_urlencoded::from_bytes(body)
         .map_err(|e| Error::Malformed(format!("The submitted form cannot be read: {e}.")))?;
-    read_from(&pairs, "form field")
+    let given = pairs.len();
+    loop {
+        match read_from(&pairs, "form field") {
+            Err(Error::Unreadable(missing))
+                if missing.allowed.as_deref() == Some(PRESENT) && values(&pairs, &missing.field).next().is_none() =>
+            {
+                pairs.push((missing.field, String::new()));
+            }
+            // A field with an identifier or a choice cannot be empty.
+            Err(Error::Invalid(_)) if pairs.len() > given => {
+                return Err(Error::Malformed(INCOMPLETE_FORM.to_owned()));
+            }
+            read => return read,
+        }
+    }
 }
+
+/// What a missing field must be.
+const PRESENT: &str = "present";
 
 /// Reads named values. `what` is the word for one of them.
 fn read_from<T: DeserializeOwned>(pairs: &Pairs, what: &str) -> Result<T, Error> {
@@ -95,7 +113,7 @@ fn refusal(path: &str, message: &str, pairs: &Pairs, what: &str) -> Error {
     // The value comes before what is expected, and may hold any words.
     let expected = || json_document::expected(message.rfind(", expected ").map_or(message, |at| &message[at..]));
     if let Some(field) = named("missing field `") {
-        return unreadable(field, format!("The {what} {field} is missing."), "present");
+        return unreadable(field, format!("The {what} {field} is missing."), PRESENT);
     }
     if let Some(field) = named("duplicate field `") {
         return unreadable(field, repeated(what, field), "present only once");
@@ -299,7 +317,7 @@ impl<'de> Deserializer<'de> for Text<'de> {
 
 #[cfg(test)]
 mod tests {
-    use super::{pairs, read};
+    use super::{pairs, read, read_form};
     use gaitwright_service::error::Error;
     use serde::Deserialize;
 
@@ -334,6 +352,23 @@ mod tests {
         let asked: Asked = read(&pairs("number=7&share=0.5&order=descending&contains=12").unwrap()).unwrap();
         let (order, contains) = (Some(Order::Descending), "12".to_owned());
         assert_eq!(asked, Asked { number: 7, share: Some(0.5), order, contains, places: Vec::new() });
+    }
+
+    #[test]
+    fn missing_field_of_a_form_is_empty_or_makes_the_form_incomplete() {
+        #[derive(Debug, Deserialize)]
+        struct Sent {
+            reason: String,
+            after: u32,
+        }
+        let sent: Sent = read_form(b"after=3").unwrap();
+        assert_eq!((sent.reason.as_str(), sent.after), ("", 3));
+        for body in ["", "reason=moved"] {
+            let refused = read_form::<Sent>(body.as_bytes()).unwrap_err().to_string();
+            assert!(refused.starts_with("The form was not sent completely"), "{body}: {refused}");
+        }
+        let wrong = read_form::<Sent>(b"reason=moved&after=x").unwrap_err();
+        assert!(matches!(wrong, Error::Invalid(_)), "{wrong}");
     }
 
     #[test]

@@ -38,9 +38,9 @@ pub(crate) trait TypedForm: Clone {
     }
 }
 
-/// The label of a field; empty for a field that the form does not have.
+/// The label of a field. A field without one is still named in words.
 pub(crate) fn label(labels: FieldLabels, field: &str) -> &'static str {
-    labels.iter().find(|(name, _)| *name == field).map_or("", |(_, label)| label)
+    labels.iter().find(|(name, _)| *name == field).map_or(form_errors::WITHOUT_LABEL, |(_, label)| label)
 }
 
 pub(crate) fn labels_of(labels: FieldLabels) -> Vec<(String, String)> {
@@ -169,7 +169,8 @@ impl<F: TypedForm> FormCheck<F> {
             return Ok(false);
         }
         let label = self.labels.iter().find(|(name, _)| *name == field).map(|(_, label)| label.as_str());
-        let message = label.map_or_else(|| fault.message.clone(), |label| form_errors::of_field(label, &fault));
+        let message =
+            label.map_or_else(|| form_errors::without_label(&fault), |label| form_errors::of_field(label, &fault));
         let goes_on = self.repaired.repair(&field);
         self.refused.found.push(FieldError { field, message, ..fault });
         Ok(goes_on)

@@ -6,7 +6,8 @@ use super::page_error::{is_for_programs, shown};
 use super::problem_details::Problem;
 use super::problem_kinds::ProblemKind;
 use axum::extract::{MatchedPath, Request};
-use axum::http::{HeaderName, HeaderValue, header};
+use axum::http::uri::{Authority, PathAndQuery};
+use axum::http::{HeaderName, HeaderValue, Method, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use std::any::Any;
@@ -21,11 +22,22 @@ pub(super) async fn complete(request: Request, next: Next) -> Response {
     let id = Uuid::now_v7().simple().to_string();
     let span = span_of(&request, &id);
     let for_programs = is_for_programs(request.uri().path());
-    let mut response = with_problem(next.run(request).instrument(span).await, &id, for_programs);
+    let back = form_page(&request);
+    let mut response = with_problem(next.run(request).instrument(span).await, &id, for_programs, back);
     if let Ok(id) = HeaderValue::from_str(&id) {
         response.headers_mut().insert(REQUEST_ID.clone(), id);
     }
     response
+}
+
+/// The page of this service with the form that was sent, as the browser names it.
+fn form_page(request: &Request) -> Option<String> {
+    let header = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
+    let page: Uri = header(header::REFERER).filter(|_| request.method() == Method::POST)?.parse().ok()?;
+    let is_own = page.authority().map(Authority::as_str) == header(header::HOST);
+    let address = page.path_and_query().map(PathAndQuery::as_str)?;
+    // Two slashes would begin the name of another host.
+    (is_own && address.starts_with('/') && !address.starts_with("//")).then(|| address.to_owned())
 }
 
 /// The log span of a request. It has the route instead of the address, which may contain a sign-in secret or the token
@@ -37,7 +49,7 @@ fn span_of(request: &Request, id: &str) -> tracing::Span {
 }
 
 /// Adds a problem document with the request identifier to a failure.
-fn with_problem(mut response: Response, id: &str, for_programs: bool) -> Response {
+fn with_problem(mut response: Response, id: &str, for_programs: bool, back: Option<String>) -> Response {
     let problem = match response.extensions_mut().remove::<Problem>() {
         Some(problem) => problem,
         None if speaks_for_itself(&response) => return response,
@@ -51,7 +63,7 @@ fn with_problem(mut response: Response, id: &str, for_programs: bool) -> Respons
     };
     let problem = Problem { request_id: Some(id.to_owned()), ..problem };
     let to = response.extensions().get::<RespondedTo>().copied();
-    let new = if for_programs { problem.into_response() } else { shown(problem, to) };
+    let new = if for_programs { problem.into_response() } else { shown(problem, to, back) };
     let (parts, body) = new.into_parts();
     *response.body_mut() = body;
     response.headers_mut().remove(header::CONTENT_LENGTH);

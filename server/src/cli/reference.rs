@@ -8,7 +8,7 @@ use super::out_file::OutFile;
 use super::output::{data, tell};
 use clap::Args;
 use gaitwright_service::error::Error;
-use gaitwright_service::studies::angle_columns::ChosenColumns;
+use gaitwright_service::studies::angle_columns::{ChosenColumn, ChosenColumns};
 use gaitwright_service::studies::reference_import::{JointAngleFormat, NewReferenceGait, Strikes, Unit};
 use std::path::{Path, PathBuf};
 
@@ -26,6 +26,13 @@ pub(super) struct ReferenceCommand {
     /// Unit of angles, if the header of an OpenSim file does not state it.
     #[arg(long, value_parser = one_of::<Unit>(ANGLE_UNITS))]
     unit: Option<Unit>,
+    /// Columns of the angles of a file with other names, as in torso=Trunk,knee_L="Left knee" (torso, hip_L, knee_L, ankle_L,
+    /// hip_R, knee_R). The first column is the time, s; hip angles are relative to the torso.
+    #[arg(long, value_name = "JOINT=COLUMN,...", value_delimiter = ',', value_parser = column)]
+    columns: Vec<(String, String)>,
+    /// Angles among --columns whose sign is opposite to that of the walker: forward lean, flexion and dorsiflexion are positive.
+    #[arg(long, value_name = "JOINT,...", value_delimiter = ',', requires = "columns")]
+    reversed: Vec<String>,
     /// Column of the vertical force under the right foot (default with --forces: ground_force_vy, or Treadmill_R_vy
     /// with --format camargo).
     #[arg(long, value_name = "NAME")]
@@ -53,12 +60,13 @@ pub(super) struct ReferenceCommand {
 
 impl ReferenceCommand {
     pub(super) fn run(self) -> Result<(), Error> {
+        let columns = self.chosen_columns()?;
         let new = NewReferenceGait {
             name: self.name,
             format: self.format,
             recording: read(&self.recording)?,
             unit: self.unit,
-            columns: ChosenColumns::new(),
+            columns,
             force_column: self.force_column,
             forces: self.forces.as_deref().map(read).transpose()?,
             strikes: self.strikes,
@@ -69,6 +77,8 @@ impl ReferenceCommand {
         let forces = self.forces.as_ref().map_or_else(String::new, |path| path.display().to_string());
         let flags = [
             ("name", "--name"),
+            ("unit", "--unit"),
+            ("columns", "--columns"),
             ("heel_strikes_s", "--heel-strikes-s"),
             ("height_m", "--height-m"),
             ("body_mass_kg", "--body-mass-kg"),
@@ -85,4 +95,24 @@ impl ReferenceCommand {
             None => data(&json),
         }
     }
+
+    /// The column of each angle, with its sign.
+    fn chosen_columns(&self) -> Result<ChosenColumns, Error> {
+        let mut chosen = ChosenColumns::new();
+        for (joint, column) in &self.columns {
+            let column = ChosenColumn { column: column.clone(), reversed: self.reversed.contains(joint) };
+            if chosen.insert(joint.clone(), column).is_some() {
+                return Err(Error::invalid("--columns", joint.as_str(), "given once for each angle"));
+            }
+        }
+        match self.reversed.iter().find(|joint| !chosen.contains_key(*joint)) {
+            Some(joint) => Err(Error::invalid("--reversed", joint.as_str(), "one of the angles in --columns")),
+            None => Ok(chosen),
+        }
+    }
+}
+
+fn column(text: &str) -> Result<(String, String), String> {
+    let (joint, column) = text.split_once('=').ok_or("must be JOINT=COLUMN, as in torso=Trunk")?;
+    Ok((joint.trim().to_owned(), column.trim().to_owned()))
 }

@@ -660,21 +660,31 @@ async fn browser_shows_the_analysis_whole_on_a_phone_and_on_paper() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_prints_trials_without_breaking_headings() {
+async fn browser_prints_tables_without_breaking_headings() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = site.service.study(|new| new.number_of_trials = 12).await;
     site.service.wait_for(study, &[StudyState::Finished]).await;
-    let page = browser.open(&site.at(&format!("/studies/{study}"))).await;
-    page.be_paper().await;
-    // A4 between margins of 1 cm.
-    page.resize(718, 1000).await;
-    let broken = "[...document.querySelectorAll('.trials thead th')].flatMap(th => { \
+    let gait = site
+        .service
+        .trials(study)
+        .await
+        .into_iter()
+        .find(|trial| trial.state == gaitwright_store::trials::TrialState::Converged)
+        .unwrap()
+        .id;
+    let broken = "[...document.querySelectorAll('thead th')].flatMap(th => { \
         const walker = document.createTreeWalker(th, NodeFilter.SHOW_TEXT); const broken = []; \
         for (let t = walker.nextNode(); t; t = walker.nextNode()) for (const word of t.data.matchAll(/[^ ]+/g)) { \
           const range = document.createRange(); range.setStart(t, word.index); range.setEnd(t, word.index + word[0].length); \
           if (range.getClientRects().length > 1) broken.push(word[0]); } return broken; }).join()";
-    assert_eq!(page.value(broken).await, "");
-    assert_eq!(page.beyond().await, "0");
+    for path in [format!("/studies/{study}"), format!("/studies/{study}/analysis"), format!("/trials/{gait}")] {
+        let page = browser.open(&site.at(&path)).await;
+        page.be_paper().await;
+        // A4 between margins of 1 cm.
+        page.resize(718, 1000).await;
+        assert_eq!(page.value(broken).await, "", "{path}");
+        assert_eq!(page.beyond().await, "0", "{path}");
+    }
     browser.close().await;
 }

@@ -1550,9 +1550,9 @@ class Job(TypedDict):
 class JointAngleReading(TypedDict, total=False):
     """How to read a file with joint angles."""
 
-    # Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R) of a file whose columns have other
-    # names or signs. Then the first column is the time, s, under any name; a CSV file needs `unit`; and hip angles are
-    # relative to the torso. If empty, the columns have the names of the format.
+    # Column of each angle of a file whose columns have other names or signs. Then the first column is the time, s,
+    # under any name; a CSV file needs `unit`; and hip angles are relative to the torso. If empty, the columns have the
+    # names of the format.
     columns: dict[str, ChosenColumn]
     # Cut-off frequency of the low-pass filter before differentiation, Hz.
     cutoff_hz: float
@@ -2204,9 +2204,10 @@ class NewReferenceGait(_NewReferenceGaitRequired, total=False):
 
     # Body mass of the measured person, kg.
     body_mass_kg: Optional[float]
-    # Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R and, to find heel strikes from joint angles, knee_R) of
-    # a file whose columns have other names or signs. Then the first column is the time, s, under any name; a CSV file
-    # needs `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
+    # Column of each angle of a file whose columns have other names or signs: of torso, left leg and right hip and, to
+    # find heel strikes from joint angles, of the right knee. Then the first column is the time, s, under any name; a
+    # CSV file needs `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the
+    # format.
     columns: dict[str, ChosenColumn]
     # Column of the vertical force under the right foot. With `forces`, defaults to `ground_force_vy`, or to
     # `Treadmill_R_vy` for Camargo 2021.

@@ -8,6 +8,22 @@ use gaitwright_service::studies::lab::{JointAngleReading, MeasurementFormat, New
 use gaitwright_service::studies::reference_import::Unit;
 use serde::Deserialize;
 
+/// A step of the form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum JointAngleStep {
+    /// Which file.
+    File,
+    /// Which column has which angle, unless the names of the columns tell it.
+    Columns,
+    /// The limit cycles.
+    Result,
+}
+
+impl JointAngleStep {
+    pub(super) const ALL: [(Self, &'static str); 3] =
+        [(Self::File, "File"), (Self::Columns, "Columns"), (Self::Result, "Result")];
+}
+
 /// The form for joint angles, as typed.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(default)]

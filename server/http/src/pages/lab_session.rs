@@ -1,7 +1,7 @@
 //! The page of a lab session with its walks and measurements.
 
 use super::emg_form::{EmgFields, EmgStep};
-use super::joint_angle_form::JointAngleFields;
+use super::joint_angle_form::{JointAngleFields, JointAngleStep};
 use super::measurement_forms::{FilterFields, Forms};
 use super::page_chart::{PageChart, shared_legend};
 use crate::AppState;

@@ -4,7 +4,7 @@ use super::angle_columns_form::ColumnsPage;
 use super::emg_form::{EmgFields, EmgStep};
 use super::emg_signals::SignalsPreview;
 use super::form_numbers::number;
-use super::joint_angle_form::JointAngleFields;
+use super::joint_angle_form::{JointAngleFields, JointAngleStep};
 use super::recording_preview::RecordingPreview;
 use crate::refused_fields::{FieldLabels, RefusedFields, TypedForm};
 use gait_optimizer::emg::{EmgSettings, MAX_RATE_HZ};
@@ -99,6 +99,15 @@ impl Forms {
     /// The step of the form for EMG.
     pub(super) fn step(&self) -> EmgStep {
         self.emg_step.as_ref().map_or(EmgStep::File, |page| page.step)
+    }
+
+    /// The step of the form for joint angles.
+    pub(super) fn joint_angle_step(&self) -> JointAngleStep {
+        match (&self.joint_angle_columns, &self.joint_angle_preview) {
+            (_, Some(_)) => JointAngleStep::Result,
+            (Some(_), None) => JointAngleStep::Columns,
+            (None, None) => JointAngleStep::File,
+        }
     }
 
     /// The entries for EMG of later steps than the one that is shown.

@@ -97,8 +97,8 @@ pub struct NewReferenceGait {
     /// Unit of angles, if the header of an OpenSim file does not state it.
     #[serde(default)]
     pub unit: Option<Unit>,
-    /// Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R and, to find heel strikes from joint angles, knee_R) of a
-    /// file whose columns have other names or signs. Then the first column is the time, s, under any name; a CSV file needs
+    /// Column of each angle of a file whose columns have other names or signs: of torso, left leg and right hip and, to find
+    /// heel strikes from joint angles, of the right knee. Then the first column is the time, s, under any name; a CSV file needs
     /// `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
     #[serde(default)]
     #[schema(value_type = BTreeMap<String, ChosenColumn>)]

@@ -2,7 +2,7 @@
 
 use super::fields::{KEPT_LEARNER, LEARNERS, NewStudyFields, learner};
 use crate::accessible::Named;
-use crate::bound_units;
+use crate::bound_entries::BoundField;
 use gait_optimizer::{LocalOptimumChoice, TunedBounds};
 use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
@@ -58,15 +58,16 @@ impl NewStudyFields {
             let to = all[place];
             let as_loose = |value: &f64| if TunedBounds::IS_LOWER[place] { *value < to } else { *value > to };
             let values = self.space.get(&format!("values_{name}")).map_or("", String::as_str);
-            let values = bound_units::read_list(name, values).unwrap_or_default();
+            let field = BoundField::of_values(name);
+            let values = field.read_list(values).unwrap_or_default();
             let mut kept: Vec<f64> = values.into_iter().filter(as_loose).collect();
             kept.push(to);
             kept.sort_by(f64::total_cmp);
-            self.space.insert(format!("fixed_{name}"), bound_units::entry(name, to));
+            self.space.insert(format!("fixed_{name}"), field.entry(to));
             if kept.len() < 2 {
                 self.space.remove(&format!("tuned_{name}"));
             } else {
-                self.space.insert(format!("values_{name}"), bound_units::list(name, &kept));
+                self.space.insert(format!("values_{name}"), field.list(&kept));
             }
         }
         self.relaxed = true;
@@ -87,11 +88,12 @@ fn space_of(plan: &StudyPlan) -> BTreeMap<String, String> {
     let fixed = plan.base_bounds.to_array();
     let mut space = BTreeMap::new();
     for (place, name) in TunedBounds::NAMES.into_iter().enumerate() {
-        space.insert(format!("fixed_{name}"), bound_units::entry(name, fixed[place]));
+        let field = BoundField::of_values(name);
+        space.insert(format!("fixed_{name}"), field.entry(fixed[place]));
         if let Some(dimension) = plan.search_space.dimensions().iter().find(|dimension| dimension.name == name) {
             space.insert(format!("tuned_{name}"), "on".to_owned());
-            space.insert(format!("values_{name}"), bound_units::list(name, &dimension.values));
-            space.insert(format!("lengthscale_{name}"), bound_units::entry(name, dimension.lengthscale));
+            space.insert(format!("values_{name}"), field.list(&dimension.values));
+            space.insert(format!("lengthscale_{name}"), BoundField::of_differences(name).entry(dimension.lengthscale));
         }
     }
     space

@@ -1,5 +1,6 @@
 //! The editor of the search space: tuned bounds with their values, and fixed values of the others.
 
+use crate::bound_entries::{BoundField, Unread};
 use crate::bound_units;
 use crate::form_errors;
 use gait_learner::{Dimension, LearnerError, SearchSpace};
@@ -14,6 +15,8 @@ pub(super) struct BoundEntries {
     pub(super) name: &'static str,
     pub(super) meaning: String,
     pub(super) allowed: String,
+    /// Whether a number may need a unit, which numeric keypads cannot type.
+    pub(super) is_angle: bool,
     pub(super) tuned: bool,
     pub(super) values: String,
     pub(super) lengthscale: String,
@@ -44,14 +47,16 @@ impl SpaceEditor {
         let row = |(bound, name): (usize, &'static str)| {
             let (values, lengthscale) = TABLE_I[bound];
             let text = |part: &str, preset: String| fields.get(&format!("{part}_{name}")).cloned().unwrap_or(preset);
+            let field = BoundField::of_values(name);
             BoundEntries {
                 name,
                 meaning: bound_units::meaning(name),
-                allowed: bound_units::allowed(name),
+                allowed: field.allowed(),
+                is_angle: field.is_angle(),
                 tuned: fields.is_empty() || fields.contains_key(&format!("tuned_{name}")),
-                values: text("values", bound_units::list(name, values)),
-                lengthscale: text("lengthscale", bound_units::entry(name, lengthscale)),
-                fixed: text("fixed", bound_units::entry(name, defaults[bound])),
+                values: text("values", field.list(values)),
+                lengthscale: text("lengthscale", BoundField::of_differences(name).entry(lengthscale)),
+                fixed: text("fixed", field.entry(defaults[bound])),
             }
         };
         Ok(Self { rows: TunedBounds::NAMES.into_iter().enumerate().map(row).collect() })
@@ -65,23 +70,23 @@ impl SpaceEditor {
         let mut fixed = TunedBounds::default();
         let mut dimensions = Vec::new();
         for row in &self.rows {
+            let of_row = BoundField::of_values(row.name);
             if !row.tuned {
                 let field = format!("fixed_{}", row.name);
-                let refused = || Error::invalid(&field, as_typed(&row.fixed), &row.allowed);
-                let value = bound_units::read(row.name, &row.fixed).ok_or_else(refused)?;
-                fixed.set(row.name, value).map_err(|_| refused())?;
+                let value = of_row.read(&row.fixed).map_err(|unread| refused(&field, &unread, &row.allowed))?;
+                let beyond = |_| Error::invalid(&field, as_typed(&row.fixed), &row.allowed);
+                fixed.set(row.name, value).map_err(beyond)?;
                 continue;
             }
             let field = format!("values_{}", row.name);
-            let refused = |part: String| Error::invalid(&field, as_typed(&part), &row.allowed);
-            let values = bound_units::read_list(row.name, &row.values).map_err(refused)?;
+            let values = of_row.read_list(&row.values).map_err(|unread| refused(&field, &unread, &row.allowed))?;
             for &value in &values {
-                let refused = |_| refused(bound_units::entry(row.name, value));
-                fixed.clone().set(row.name, value).map_err(refused)?;
+                let beyond = |_| Error::invalid(&field, as_typed(&of_row.entry(value)), &row.allowed);
+                fixed.clone().set(row.name, value).map_err(beyond)?;
             }
-            let lengthscale = bound_units::read(row.name, &row.lengthscale).ok_or_else(|| {
-                Error::invalid(&format!("lengthscale_{}", row.name), as_typed(&row.lengthscale), "a number above 0")
-            })?;
+            let lengthscale = BoundField::of_differences(row.name)
+                .read(&row.lengthscale)
+                .map_err(|unread| refused(&format!("lengthscale_{}", row.name), &unread, "a number above 0"))?;
             dimensions.push(Dimension { name: row.name.to_owned(), values, lengthscale });
         }
         let space = SearchSpace::new(dimensions).map_err(|error| match error {
@@ -115,6 +120,14 @@ impl SpaceEditor {
     }
 }
 
+/// The refusal of an entry that is not read.
+fn refused(field: &str, unread: &Unread, allowed: &str) -> Error {
+    match &unread.doubt {
+        Some(doubt) => FieldError::in_words(field, &format!("{field}: {doubt}")).into(),
+        None => Error::invalid(field, as_typed(&unread.part), allowed),
+    }
+}
+
 /// A refused entry: a number if it is one.
 fn as_typed(text: &str) -> Value {
     let text = text.trim();
@@ -131,7 +144,7 @@ mod tests {
         fields.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect()
     }
 
-    fn refused(fields: &[(&str, &str)]) -> String {
+    fn refused_field(fields: &[(&str, &str)]) -> String {
         match SpaceEditor::typed(&typed(fields)).and_then(|editor| editor.read()) {
             Err(Error::Invalid(field)) => field.field,
             other => format!("{:?}", other.map(|_| ())),
@@ -162,13 +175,13 @@ mod tests {
 
     #[test]
     fn errors_name_the_wrong_field() {
-        assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, high")]), "values_a5");
-        assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "0, 7")]), "values_a5");
-        assert_eq!(refused(&[("tuned_a5", "on"), ("values_a5", "")]), "values_a5");
-        assert_eq!(refused(&[("tuned_a5", "on"), ("lengthscale_a5", "wide")]), "lengthscale_a5");
-        assert_eq!(refused(&[("tuned_a1", "on"), ("lengthscale_a1", "-5")]), "lengthscale_a1");
-        assert_eq!(refused(&[("tuned_a5", "on"), ("fixed_a6", "NaN")]), "fixed_a6");
-        assert_eq!(refused(&[("fixed_a6", "0.1")]), "tuned_a1");
+        assert_eq!(refused_field(&[("tuned_a5", "on"), ("values_a5", "0, high")]), "values_a5");
+        assert_eq!(refused_field(&[("tuned_a5", "on"), ("values_a5", "0, 7")]), "values_a5");
+        assert_eq!(refused_field(&[("tuned_a5", "on"), ("values_a5", "")]), "values_a5");
+        assert_eq!(refused_field(&[("tuned_a5", "on"), ("lengthscale_a5", "wide")]), "lengthscale_a5");
+        assert_eq!(refused_field(&[("tuned_a1", "on"), ("lengthscale_a1", "-5")]), "lengthscale_a1");
+        assert_eq!(refused_field(&[("tuned_a5", "on"), ("fixed_a6", "NaN")]), "fixed_a6");
+        assert_eq!(refused_field(&[("fixed_a6", "5.73")]), "tuned_a1");
         // 1,000 values of each bound within its range.
         let mut every = Vec::new();
         for (name, (low, high)) in TunedBounds::NAMES.into_iter().zip(TunedBounds::RANGES) {
@@ -178,7 +191,7 @@ mod tests {
             every.push((format!("lengthscale_{name}"), (high - low).to_string()));
         }
         let every: Vec<(&str, &str)> = every.iter().map(|(name, value)| (name.as_str(), value.as_str())).collect();
-        assert_eq!(refused(&every), "values_a1");
+        assert_eq!(refused_field(&every), "values_a1");
         let unknown = SpaceEditor::typed(&typed(&[("values_a0", "1")])).err().unwrap();
         assert_eq!(unknown.to_string(), "The form has no field values_a0.");
     }

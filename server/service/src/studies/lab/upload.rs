@@ -41,9 +41,8 @@ pub struct JointAngleReading {
     pub format: MeasurementFormat,
     /// Unit of angles, if the header of an OpenSim file does not state it.
     pub unit: Option<Unit>,
-    /// Column of each angle (torso, hip_L, knee_L, ankle_L, hip_R, knee_R, ankle_R) of a file whose columns have other names
-    /// or signs. Then the first column is the time, s, under any name; a CSV file needs `unit`; and hip angles are relative to
-    /// the torso. If empty, the columns have the names of the format.
+    /// Column of each angle of a file whose columns have other names or signs. Then the first column is the time, s, under any
+    /// name; a CSV file needs `unit`; and hip angles are relative to the torso. If empty, the columns have the names of the format.
     #[schema(value_type = BTreeMap<String, ChosenColumn>)]
     pub columns: ChosenColumns,
     /// Cut-off frequency of the low-pass filter before differentiation, Hz.
