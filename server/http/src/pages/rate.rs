@@ -65,7 +65,7 @@ impl RatePage {
 }
 
 /// Time between two requests for the next pair while there is none, s.
-const POLL_INTERVAL_S: u32 = 5;
+const POLL_INTERVAL_S: u32 = 1;
 /// Time to read a confirmation that cannot be undone, s.
 const CONFIRMATION_S: u32 = 2;
 
