@@ -87,6 +87,8 @@ const PAGES: [(&str, Option<Right>); 80] = [
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
     ("get /studies/{id}/analysis", Some(Right::Read)),
+    ("get /studies/{id}/atlas", Some(Right::Read)),
+    ("post /studies/{id}/atlas", Some(Right::Run)),
     ("get /studies/{id}/figures", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),
