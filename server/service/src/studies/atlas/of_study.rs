@@ -30,7 +30,7 @@ pub fn atlas_of(study: NewStudy) -> NewStudy {
         warm_start_from: WarmStartFrom::Root,
         atlas: AtlasRole::Make,
         simulated_walks: defaults.simulated_walks,
-        parallel_trials: BATCH as u32,
+        parallel_trials: u32::try_from(BATCH).unwrap_or(1),
         priority: PRIORITY,
         seed: defaults.seed,
         start: true,
