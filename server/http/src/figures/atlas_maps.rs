@@ -8,6 +8,11 @@ use gaitwright_service::error::Error;
 use gaitwright_service::studies::atlas::{AtlasResult, StudyAtlas};
 use std::collections::BTreeSet;
 
+/// Value, text and the text below it of a tile.
+type TileContent = (f64, String, String);
+/// What a map shows of a result; `None` without a gait.
+type Shown<'a> = &'a dyn Fn(AtlasResult<'_>) -> Option<TileContent>;
+
 /// So many active bounds are named in a tile.
 const NAMED: usize = 4;
 
@@ -56,7 +61,7 @@ pub(crate) fn maps(
         let below = if names.len() > NAMED { String::new() } else { names.join(" ") };
         result.gait.map(|_| (names.len() as f64, names.len().to_string(), below))
     };
-    let of: [(&str, &dyn Fn(AtlasResult<'_>) -> Option<(f64, String, String)>); 3] =
+    let of: [(&str, Shown<'_>); 3] =
         [("Gait RMSE, rad", &rmse), ("Cost of transport", &cost), ("Active bounds", &active)];
     let axis = |place: usize| {
         let dimension = &space.dimensions()[place];
@@ -78,7 +83,7 @@ fn tiles(
     space: &SearchSpace,
     (right, down): (usize, usize),
     held: ActionIndex,
-    value: &dyn Fn(AtlasResult<'_>) -> Option<(f64, String, String)>,
+    value: Shown<'_>,
 ) -> Result<Vec<Vec<Tile>>, LearnerError> {
     let tile = |row: usize, column: usize| {
         let mut levels = space.levels(held);
