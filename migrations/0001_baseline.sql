@@ -137,6 +137,8 @@ create table studies (
     -- The gait from which trials are warm-started: the best one so far, or the first one of the study.
     warm_start_from      text not null
                          constraint studies_warm_start_from check (warm_start_from in ('incumbent', 'root')),
+    -- What the study does with an atlas: nothing, make one, or take its gaits from one of the same problem.
+    atlas                text not null constraint studies_atlas check (atlas in ('none', 'make', 'use')),
     -- What simulated walks with each gait do.
     simulated_walks      text not null constraint studies_simulated_walks_json check (json_valid(simulated_walks)),
     parallel_trials      integer not null constraint studies_parallel_trials check (parallel_trials between 1 and 64),

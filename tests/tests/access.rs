@@ -75,7 +75,7 @@ async fn every_role_and_scope_has_exactly_the_described_rights() {
 }
 
 /// The pages, as in the router. A page that is not listed here fails the test.
-const PAGES: [(&str, Option<Right>); 80] = [
+const PAGES: [(&str, Option<Right>); 82] = [
     ("get /", Some(Right::Read)),
     ("get /studies/new", Some(Right::Run)),
     ("post /studies/new", Some(Right::Run)),
@@ -87,6 +87,8 @@ const PAGES: [(&str, Option<Right>); 80] = [
     ("get /studies/{id}", Some(Right::Read)),
     ("get /studies/{id}/live", Some(Right::Read)),
     ("get /studies/{id}/analysis", Some(Right::Read)),
+    ("get /studies/{id}/atlas", Some(Right::Read)),
+    ("post /studies/{id}/atlas", Some(Right::Run)),
     ("get /studies/{id}/figures", Some(Right::Read)),
     ("post /studies/{id}/do", Some(Right::Run)),
     ("get /studies/{id}/compare", Some(Right::Read)),

@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tile {
-    /// Value that determines the shade.
+    /// Value that determines the shade. A cell whose value is not finite has the lightest shade and no contour lines.
     pub value: f64,
     /// Text of the cell.
     pub text: String,
@@ -96,6 +96,7 @@ impl HeatMap {
             for (column, cell) in cells.iter().enumerate() {
                 let (x, y) = (LEFT + width * column as f64, TOP + ROW * row as f64);
                 let share = ((cell.value - low) / (high - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let share = if cell.value.is_finite() { share } else { 0.0 };
                 let class = if cell.framed { "cell framed" } else { "cell" };
                 write!(
                     svg,
@@ -148,15 +149,16 @@ mod tests {
     #[test]
     fn cells_have_their_values_and_equal_values_share_a_shade() {
         let cell = |value: f64| Tile { value, text: format!("<{value}>"), below: String::new(), framed: value > 1.0 };
+        let unknown = Tile { value: f64::NAN, text: "none".to_owned(), below: String::new(), framed: false };
         let map = HeatMap {
             title: "t".to_owned(),
-            columns: ("x".to_owned(), vec![1.0, 2.0]),
+            columns: ("x".to_owned(), vec![1.0, 2.0, 3.0]),
             rows: ("y".to_owned(), vec![3.0]),
-            cells: vec![vec![cell(1.0), cell(2.0)]],
+            cells: vec![vec![cell(1.0), cell(2.0), unknown]],
             range: (1.0, 1.0),
         };
         let svg = map.svg();
-        assert_eq!(svg.matches("<rect").count(), 2);
+        assert_eq!(svg.matches("<rect").count(), 3);
         assert_eq!(svg.matches("framed").count(), 1);
         assert!(svg.contains("&lt;1&gt;") && !svg.contains("NaN") && !svg.contains("inf"));
     }

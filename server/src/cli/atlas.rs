@@ -17,7 +17,7 @@ use gait_optimizer::TunedBounds;
 use gaitwright_compute::Pool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::atlas::{self, BestCertifiedGaitSearch};
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
@@ -53,7 +53,7 @@ impl AtlasCommand {
         tell(&format!("partial results: {}", progress_path.display()));
         let pool = Pool::new(1);
         let made = pool.run(move |pool| {
-            let bar = ProgressBar::no_length();
+            let bar = progress_bar();
             let mut show = |map: &atlas::GaitMap| {
                 bar.set_length(map.actions());
                 bar.set_position(map.assigned());
@@ -107,6 +107,17 @@ fn write_best(found: BestCertifiedGaitSearch, file: OutFile) -> Result<(), Error
     }
     tell(&certify::for_people(&best.certificate));
     Ok(())
+}
+
+/// A bar over actions. The time left assumes that further solves serve as many actions as those so far.
+fn progress_bar() -> ProgressBar {
+    let bar = ProgressBar::no_length();
+    if let Ok(style) = ProgressStyle::with_template(
+        "{elapsed_precise} [{bar:30}] {pos} of {len} actions have a result, about {eta} left",
+    ) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar
 }
 
 fn progress_path(out: &Path) -> PathBuf {

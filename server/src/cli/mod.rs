@@ -3,6 +3,7 @@
 
 mod archive_commands;
 mod atlas;
+mod atlas_study;
 mod atlas_table;
 mod audit;
 mod backup;

@@ -1,5 +1,6 @@
 //! `gaitwright tune`: runs an unattended study.
 
+use super::atlas_study;
 use super::command_end::{self, CommandEnd};
 use super::cores::cores_or;
 use super::flag_choices::{WARM_STARTS, one_of};
@@ -22,7 +23,7 @@ use gaitwright_service::studies::study_plan::NewStudy;
 use gaitwright_service::studies::summary::{self, SimulatedWalksSummary, Summary};
 use gaitwright_service::studies::{built_in_entries, device, reference_import};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::studies::WarmStartFrom;
+use gaitwright_store::studies::{AtlasRole, WarmStartFrom};
 use gaitwright_store::{Store, commit};
 use std::sync::Arc;
 
@@ -51,8 +52,12 @@ pub(super) struct TuneCommand {
     #[arg(long)]
     repeat_results: bool,
     /// The gait from which trials are warm-started (default: incumbent).
-    #[arg(long, default_value = "incumbent", hide_default_value = true, value_parser = one_of::<WarmStartFrom>(WARM_STARTS))]
+    #[arg(long, default_value_if("atlas", "true", "root"), default_value = "incumbent", hide_default_value = true, value_parser = one_of::<WarmStartFrom>(WARM_STARTS))]
     warm_start_from: WarmStartFrom,
+    /// Take every gait from an atlas of the problem, which the record keeps: the first run makes it, with all workers; later
+    /// studies of the same problem take their gaits at once. Needs the root gait as warm start, which is then the default.
+    #[arg(long, conflicts_with = "repeat_results")]
+    atlas: bool,
     #[command(flatten)]
     simulated_walks: SimulatedWalksFlags,
     #[command(flatten)]
@@ -87,9 +92,14 @@ impl TuneCommand {
             seed: self.seed,
             repeat_results: Some(self.repeat_results),
             warm_start_from: self.warm_start_from,
+            atlas: if self.atlas { AtlasRole::Use } else { AtlasRole::None },
             simulated_walks: self.simulated_walks.setting(),
             ..NewStudy::of(subject.id)
         };
+        if self.atlas && Box::pin(atlas_study::complete(&store, new.clone(), workers)).await?.is_none() {
+            store.close().await;
+            return Ok(CommandEnd::Interrupted);
+        }
         let study = Box::pin(resumed_study::resumed_or_new(&store, new)).await?;
         let lines = if self.json { Lines::Progress } else { Lines::Data };
         let ran = Box::pin(unattended_study::run_and_certify(&mut store, &study, workers, lines)).await;

@@ -5,6 +5,7 @@ use super::output::{data, tell};
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::Analyses;
+use gaitwright_service::studies::atlas;
 use gaitwright_service::studies::certified_best::{self, BestCertification};
 use gaitwright_service::studies::requested_reports;
 use gaitwright_service::studies::scheduler::Scheduler;
@@ -12,7 +13,7 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_service::studies::summary;
 use gaitwright_service::workers::{GaitSolver, InProcess};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::studies::{Study, StudyState};
+use gaitwright_store::studies::{Study, StudyPlan, StudyState};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Store, studies, trials as trial_rows};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -26,6 +27,8 @@ pub(super) enum Lines {
     Data,
     /// To stderr, as progress.
     Progress,
+    /// Nowhere: only the bar is shown, over the actions of an atlas.
+    Atlas,
 }
 
 /// A study after its run.
@@ -99,7 +102,10 @@ pub(super) async fn certified(
 /// Shows progress until the study ends.
 async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<(), Error> {
     let bar = ProgressBar::new(u64::from(study.plan.number_of_trials));
-    let style = "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}";
+    let style = match lines {
+        Lines::Atlas => "{elapsed_precise} [{bar:30}] atlas: {pos} of {len} actions have a result  {msg}",
+        Lines::Data | Lines::Progress => "{elapsed_precise} [{bar:30}] {pos}/{len} trials  {msg}",
+    };
     if let Ok(style) = ProgressStyle::with_template(style) {
         bar.set_style(style.progress_chars("=> "));
     }
@@ -120,10 +126,15 @@ async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<()
                         tell(&line);
                         Ok(())
                     }
+                    Lines::Atlas => Ok(()),
                 })?;
             }
         }
-        bar.set_position(shown.len() as u64);
+        if lines == Lines::Atlas {
+            show_atlas(&bar, scheduler.store(), present.plan.clone(), rows).await?;
+        } else {
+            bar.set_position(shown.len() as u64);
+        }
         // No person can answer or resume here.
         if present.state != StudyState::Running {
             bar.finish_and_clear();
@@ -135,7 +146,7 @@ async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<()
                     changed.map_err(|e| Error::Internal(e.to_string()))?;
                     break;
                 }
-                iteration = progress.recv() => if let Ok(p) = iteration {
+                iteration = progress.recv() => if let (Ok(p), true) = (iteration, lines != Lines::Atlas) {
                     bar.set_message(format!(
                         "trial {}: iteration {}, objective {:.4}, violation {:.1e}",
                         p.number, p.record.iteration, p.record.objective, p.record.constraint_violation
@@ -144,6 +155,16 @@ async fn follow(scheduler: &Scheduler, study: &Study, lines: Lines) -> Result<()
             }
         }
     }
+}
+
+/// Shows how far an atlas is.
+async fn show_atlas(bar: &ProgressBar, store: &Store, plan: StudyPlan, trials: Vec<Trial>) -> Result<(), Error> {
+    let mut store = store.clone();
+    let progress = store.compute(move |pool| atlas::progress(pool, &plan, &trials)).await?;
+    bar.set_length(progress.actions);
+    bar.set_position(progress.with_result);
+    bar.set_message(format!("{} gaits, about {} solves left", progress.gaits, progress.solves_left));
+    Ok(())
 }
 
 fn trial_line(trial: &Trial, all: &[Trial]) -> String {

@@ -158,6 +158,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("new-study", "/studies/new".to_owned()),
         ("study", format!("/studies/{study}")),
         ("analysis", format!("/studies/{study}/analysis?x=a5&y=a6")),
+        ("atlas", format!("/studies/{study}/atlas")),
         ("side-by-side", format!("/studies/compare?a={study}&b={other}")),
         ("compare", format!("/studies/{other}/compare")),
         ("gait", format!("/trials/{gait}")),

@@ -26,6 +26,11 @@ AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
 # Identifier of an assessment.
 AssessmentId = str
 
+# What a study does with an atlas, which has the gait of every action of a search space: `none`, nothing; `make`, the
+# study is an atlas, whose trials find the gait of every action; `use`, the study tunes, and takes each gait at once
+# from a finished atlas of the same problem, if there is one on record.
+AtlasRole = Literal["none", "make", "use"]
+
 # Identifier of a backup.
 BackupId = str
 
@@ -322,6 +327,31 @@ class Assessment(TypedDict):
     trial_a: TrialId
     # The trial with gait B.
     trial_b: TrialId
+
+
+class Atlas(TypedDict):
+    """Progress and best gait of an atlas."""
+
+    # Number of actions of the search space.
+    actions: int
+    # Number of actions with a gait.
+    actions_with_gait: int
+    # Number of actions with a gait, or with a solve that found none.
+    actions_with_result: int
+    # Its Gait RMSE, rad.
+    best_certified_gait_rmse_rad: Optional[float]
+    # The trial with the lowest Gait RMSE among those that passed certification. Null if none has passed yet.
+    best_certified_trial_id: Optional[TrialId]
+    # Its Gait RMSE, rad.
+    best_gait_rmse_rad: Optional[float]
+    # The trial with the lowest Gait RMSE. Null before the first gait.
+    best_trial_id: Optional[TrialId]
+    # Number of different gaits.
+    gaits: int
+    # Number of solves that these results come from.
+    solves: int
+    # About how many solves are missing, if each serves as many further actions as the latest ones did.
+    solves_left: int
 
 
 class AttemptResult(TypedDict):
@@ -2274,6 +2304,8 @@ class NewStudy(_NewStudyRequired, total=False):
 
     # Who answers comparisons.
     answer_source: AnswerSource
+    # What the study does with an atlas. Anything but `none` needs `root` as `warm_start_from`.
+    atlas: AtlasRole
     # Values of the bounds that are not tuned.
     base_bounds: BaseBounds
     # Identifier of the device. The built-in one by default.
@@ -3108,6 +3140,8 @@ class StudyPlan(TypedDict):
 
     # Who answers comparisons.
     answer_source: AnswerSource
+    # What the study does with an atlas.
+    atlas: AtlasRole
     # Values of bounds that are not tuned.
     base_bounds: Bounds
     # Height and mass used by solves, independent of later corrections.
@@ -3205,6 +3239,10 @@ class StudyClone(TypedDict, total=False):
 
     # Who answers comparisons.
     answer_source: Optional[AnswerSource]
+    # What the study does with an atlas. `make` gives the study that makes the atlas of this problem, in which
+    # everything that does not affect gaits has its own values, and `use` one that takes its gaits from there. Both
+    # start every solve from one root gait and repeat no results.
+    atlas: Optional[AtlasRole]
     # Whether to solve with muscles.
     muscles: Optional[bool]
     # Name shown to users, which must differ from the names of all studies that you can see. By default, it is the name

@@ -3,6 +3,7 @@
 
 mod access_log;
 mod assessments;
+mod atlases;
 mod audit;
 mod backups;
 mod blind;
@@ -80,6 +81,8 @@ pub fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(study_archives::imports_of_study))
         .routes(routes!(history::of_study))
         .routes(routes!(history::of_study_csv))
+        .routes(routes!(atlases::get))
+        .routes(routes!(atlases::get_csv))
         .routes(routes!(preferences::of_study, preferences::create))
         .routes(routes!(preferences::of_study_csv))
         .routes(routes!(events::of_study))

@@ -18,6 +18,35 @@ pub(crate) struct AxisChoice {
     y: Option<String>,
 }
 
+impl AxisChoice {
+    /// The two dimensions of a map: the requested ones, by default the first ones in this order. `None` if there is only one
+    /// dimension.
+    pub(crate) fn places(&self, space: &SearchSpace, ranked: &[usize]) -> Result<Option<(usize, usize)>, Error> {
+        let names: Vec<&str> = space.dimensions().iter().map(|d| d.name.as_str()).collect();
+        if names.len() < 2 {
+            return Ok(None);
+        }
+        let place = |field: &str, asked: &Option<String>| match asked {
+            None => Ok(None),
+            Some(name) => {
+                let found = names.iter().position(|known| known == name);
+                found
+                    .map(Some)
+                    .ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
+            }
+        };
+        let (x, y) = (place("x", &self.x)?, place("y", &self.y)?);
+        let all = || ranked.iter().copied().chain(0..names.len());
+        let other_than = |taken: Option<usize>| all().find(|place| Some(*place) != taken).unwrap_or(0);
+        let x = x.unwrap_or_else(|| other_than(y));
+        let y = y.unwrap_or_else(|| other_than(Some(x)));
+        if x == y {
+            return Err(Error::invalid("y", names[y], &format!("a bound other than {}", names[x])));
+        }
+        Ok(Some((x, y)))
+    }
+}
+
 /// Two bounds, the others held.
 pub(crate) struct Maps {
     pub(crate) dimensions: Vec<DimensionChoice>,
@@ -35,26 +64,7 @@ pub(crate) struct DimensionChoice {
 /// The two dimensions of the maps: the requested ones, by default those that matter most; `None` if there is only one
 /// dimension.
 pub(crate) fn chosen(analysis: &Analysis, choice: &AxisChoice) -> Result<Option<(usize, usize)>, Error> {
-    let names: Vec<&str> = analysis.posterior.space().dimensions().iter().map(|d| d.name.as_str()).collect();
-    if names.len() < 2 {
-        return Ok(None);
-    }
-    let place = |field: &str, asked: &Option<String>| match asked {
-        None => Ok(None),
-        Some(name) => {
-            let found = names.iter().position(|known| known == name);
-            found.map(Some).ok_or_else(|| Error::invalid(field, name.as_str(), &format!("one of {}", names.join(", "))))
-        }
-    };
-    let (x, y) = (place("x", &choice.x)?, place("y", &choice.y)?);
-    let ranked = MainEffect::ranked(&analysis.main_effects);
-    let other_than = |taken: Option<usize>| ranked.iter().copied().find(|place| Some(*place) != taken).unwrap_or(0);
-    let x = x.unwrap_or_else(|| other_than(y));
-    let y = y.unwrap_or_else(|| other_than(Some(x)));
-    if x == y {
-        return Err(Error::invalid("y", names[y], &format!("a bound other than {}", names[x])));
-    }
-    Ok(Some((x, y)))
+    choice.places(analysis.posterior.space(), &MainEffect::ranked(&analysis.main_effects))
 }
 
 pub(crate) fn maps(

@@ -1,6 +1,7 @@
 //! Figures of studies, trials, lab sessions, analyses and reference gaits, for pages and for downloads.
 
 pub(crate) mod analysis;
+pub(crate) mod atlas_maps;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 pub(crate) mod maps_over_two_bounds;

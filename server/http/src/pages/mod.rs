@@ -4,6 +4,7 @@ mod access_log;
 mod analysis;
 mod angle_columns_form;
 mod api_reference;
+mod atlas;
 mod audit;
 mod certainty;
 mod certificate;
@@ -76,6 +77,7 @@ pub fn routes(state: &AppState) -> Router<AppState> {
         .route("/studies/{id}", get(study::get))
         .route("/studies/{id}/live", get(study::live))
         .route("/studies/{id}/analysis", get(analysis::get))
+        .route("/studies/{id}/atlas", get(atlas::get).post(atlas::post))
         .route("/studies/{id}/figures", get(figures::get))
         .route("/studies/{id}/details", get(study_details::get).post(study_details::post))
         .route("/studies/{id}/do", post(study::post))

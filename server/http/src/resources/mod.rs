@@ -10,6 +10,7 @@
 
 pub(crate) mod access_log;
 pub(crate) mod assessments;
+pub(crate) mod atlases;
 pub(crate) mod audit;
 pub(crate) mod certificates;
 pub(crate) mod devices;

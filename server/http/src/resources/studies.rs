@@ -4,7 +4,7 @@ use gait_learner::{LearnerSettings, SearchSpace};
 use gait_optimizer::{GaitSettings, SolveOptions, TunedBounds};
 use gaitwright_service::studies::simulated_walks_setting::SimulatedWalksSetting;
 use gaitwright_service::studies::study_plan_schemas;
-use gaitwright_store::studies::{self, AnswerSource, Evaluation, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{self, AnswerSource, AtlasRole, Evaluation, StudyState, WarmStartFrom};
 use gaitwright_store::{DeviceId, Instant, ReferenceGaitId, StudyId, SubjectId};
 use serde::Serialize;
 use utoipa::ToSchema;
@@ -114,6 +114,8 @@ pub(crate) struct StudyPlan {
     repeat_results: bool,
     /// The gait from which trials are warm-started.
     warm_start_from: WarmStartFrom,
+    /// What the study does with an atlas.
+    atlas: AtlasRole,
     /// Simulated walks with each gait.
     simulated_walks: SimulatedWalksSetting,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.
@@ -145,6 +147,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             unchanged_limit,
             repeat_results,
             warm_start_from,
+            atlas,
             simulated_walks,
             parallel_trials,
             priority,
@@ -169,6 +172,7 @@ impl From<studies::StudyPlan> for StudyPlan {
             unchanged_limit,
             repeat_results,
             warm_start_from,
+            atlas,
             simulated_walks: simulated_walks.into(),
             parallel_trials,
             priority,

@@ -7,14 +7,20 @@ use gait_optimizer::{TunedBounds, UnchangedBound};
 use gaitwright_store::trials::Trial;
 use std::ops::Range;
 
-/// The actions of the search space that have the gait of a trial, each trial's own action included.
+/// The actions of the search space that have the gait of a trial, each trial's own action included. The gait of an open trial is
+/// known if an atlas has it.
 ///
 /// # Errors
 /// When the action of a trial is not in the search space.
 pub(super) fn actions_with_known_gait(snapshot: &StudySnapshot) -> Result<ExcludedActions, LearnerError> {
     let space = &snapshot.study.plan.search_space;
     let mut boxes = Vec::new();
-    for trial in with_gait(snapshot) {
+    let of_atlas = |open: &Trial| {
+        let mut gaits = snapshot.atlas.iter().filter(|trial| trial.state.has_gait());
+        gaits.find(|trial| trial.action_index == open.action_index)
+    };
+    let open = snapshot.trials.iter().filter(|trial| trial.state.is_open()).filter_map(of_atlas);
+    for trial in with_gait(snapshot).chain(open) {
         let unchanged = trial.report.as_ref().map_or(&[][..], |report| &report.unchanged_bounds);
         boxes.push(levels_with_gait(space, space.check(trial.action_index)?, unchanged));
     }

@@ -93,8 +93,7 @@ pub async fn suggest(
     match chosen {
         Ok(new) => Ok(SuggestedTrial::New(Box::new(snapshot), Box::new(new))),
         Err(e) if e.is_exhausted() => Err(Error::conflict("Every action of the search space has been tried.")),
-        Err(ChoiceError::Learner(e)) => Err(Error::Learner(e)),
-        Err(ChoiceError::Bounds(e)) => Err(e.into()),
+        Err(error) => Err(error.into()),
     }
 }
 

@@ -12,6 +12,7 @@ pub mod answer_giver;
 pub mod archive;
 pub mod assessment_answer;
 pub mod atlas;
+mod atlas_role;
 mod automatic_pause;
 pub mod blind;
 pub mod bound_grid;

@@ -1,6 +1,7 @@
 //! Decides what a study needs next (a trial, a comparison, the end), as a pure function of its snapshot.
 
 use super::analysis::Analyses;
+use super::atlas::{self, AtlasStep};
 use super::automatic_pause::reason_to_pause;
 use super::lifecycle::StudyTransition;
 use super::pending_comparison::{self, PendingComparison};
@@ -12,10 +13,13 @@ use crate::error::Error;
 use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, Source};
-use gaitwright_store::studies::{AnswerSource, Evaluation, StudyState};
+use gaitwright_store::studies::{AnswerSource, AtlasRole, Evaluation, StudyState};
 use gaitwright_store::trials::NewTrial;
 use gaitwright_store::{FeedbackId, now};
 use std::collections::HashSet;
+
+/// Why an atlas cannot be made.
+const NO_ROOT: &str = "The first trial found no gait, so the atlas has no root gait.";
 
 /// What a study needs next.
 pub(super) enum PlanningStep {
@@ -67,6 +71,9 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
     if is_full || study.plan.evaluation == Evaluation::Script || warm_start_choice::awaits_root(snapshot) {
         return Ok(PlanningStep::Nothing);
     }
+    if study.plan.atlas == AtlasRole::Make && !snapshot.trials.is_empty() {
+        return next_of_atlas(snapshot);
+    }
     let posterior = analyses.posterior(pool, snapshot).map_err(Error::Learner)?;
     match trial_choice::next_trial(pool, snapshot, &posterior) {
         Ok(new) => Ok(PlanningStep::Try(new)),
@@ -74,9 +81,19 @@ pub(super) fn next_step(pool: &OnPool, snapshot: &StudySnapshot, analyses: &Anal
             Ok(PlanningStep::Transition(StudyTransition::Finish, all_known(snapshot)))
         }
         Err(e) if e.is_exhausted() => Ok(PlanningStep::Nothing),
-        Err(trial_choice::ChoiceError::Learner(e)) => Err(Error::Learner(e)),
-        Err(trial_choice::ChoiceError::Bounds(e)) => Err(e.into()),
+        Err(error) => Err(error.into()),
     }
+}
+
+/// The next step of a study that makes an atlas and has its first trial.
+fn next_of_atlas(snapshot: &StudySnapshot) -> Result<PlanningStep, Error> {
+    Ok(match atlas::next_of(snapshot) {
+        AtlasStep::Solve(action) => PlanningStep::Try(trial_choice::trial_of_atlas(snapshot, action)?),
+        AtlasStep::Wait => PlanningStep::Nothing,
+        _ if snapshot.open() > 0 => PlanningStep::Nothing,
+        AtlasStep::Complete => PlanningStep::Transition(StudyTransition::Finish, all_known(snapshot)),
+        AtlasStep::NoRoot => PlanningStep::Transition(StudyTransition::Finish, NO_ROOT.to_owned()),
+    })
 }
 
 /// Why no action is left.

@@ -5,10 +5,11 @@ use crate::error::Error;
 use gait_learner::{ActionIndex, Feedback, FeedbackLog};
 use gaitwright_store::feedback::{FeedbackContent, FeedbackRow, LogVersion, Source};
 use gaitwright_store::safety_reviews::{self, SafetyVersion};
-use gaitwright_store::studies::{AnswerSource, Study};
+use gaitwright_store::studies::{AnswerSource, AtlasRole, Study};
 use gaitwright_store::trials::{Label, NewTrial, Trial, TrialState};
 use gaitwright_store::{Connection, StoreResult, TrialId, Writer, feedback, studies, trials};
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 /// How often a decision is repeated because the study has changed in the meantime.
 pub const MAX_TRIES: usize = 20;
@@ -33,6 +34,8 @@ pub struct StudySnapshot {
     pub safety: SafetyVersion,
     /// What decides which gaits are walkable.
     pub grounds: Grounds,
+    /// The trials of the atlas from which the study takes gaits, by number; empty without one.
+    pub atlas: Arc<[Trial]>,
 }
 
 impl StudySnapshot {
@@ -46,7 +49,15 @@ impl StudySnapshot {
         let trials = trials::of_study(db, study.id).await?;
         let feedback = feedback::of_study(db, study.id, 0).await?;
         let grounds = Grounds::read(db, study.id).await?;
-        Ok(Self { study, trials, feedback, version, safety, grounds })
+        let atlas = match study.plan.atlas {
+            AtlasRole::Use => studies::finished_atlas(db, &study.plan).await?,
+            AtlasRole::None | AtlasRole::Make => None,
+        };
+        let atlas = match atlas {
+            Some(atlas) => trials::of_study(db, atlas).await?,
+            None => Vec::new(),
+        };
+        Ok(Self { study, trials, feedback, version, safety, grounds, atlas: atlas.into() })
     }
 
     /// Whether there is no new answer and no new safety report since this was read. A decision may then be written in
@@ -102,7 +113,7 @@ impl StudySnapshot {
         }
         let feedback = feedback::newest_of_people(db, study.id, limit).await?;
         let grounds = Grounds::read(db, study.id).await?;
-        Ok(Self { study, trials, feedback, version, safety, grounds })
+        Ok(Self { study, trials, feedback, version, safety, grounds, atlas: Arc::default() })
     }
 
     /// The trial with this identifier.

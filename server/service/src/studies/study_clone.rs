@@ -1,10 +1,10 @@
 //! Clones a study: a new one with the same set-up. For pages and REST.
 
-use super::{study_name, study_plan};
+use super::{atlas, study_name, study_plan};
 use crate::access::Reach;
 use crate::error::Error;
 use gaitwright_store::audit::Actor;
-use gaitwright_store::studies::{AnswerSource, Study};
+use gaitwright_store::studies::{AnswerSource, AtlasRole, Study, WarmStartFrom};
 use gaitwright_store::{StudyId, Writer, members, studies};
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -29,6 +29,11 @@ pub struct StudyClone {
     /// Who answers comparisons.
     #[serde(default)]
     pub answer_source: Option<AnswerSource>,
+    /// What the study does with an atlas. `make` gives the study that makes the atlas of this problem, in which everything that
+    /// does not affect gaits has its own values, and `use` one that takes its gaits from there. Both start every solve from one
+    /// root gait and repeat no results.
+    #[serde(default)]
+    pub atlas: Option<AtlasRole>,
     /// Whether to start the study immediately.
     #[serde(default)]
     pub start: bool,
@@ -47,8 +52,19 @@ pub async fn clone_study(
 ) -> Result<Study, Error> {
     let from = studies::get(writer, id).await?;
     let mut new = study_plan::NewStudy::like(&from.plan);
+    match clone.atlas {
+        None => {}
+        Some(AtlasRole::None) => new.atlas = AtlasRole::None,
+        Some(AtlasRole::Make) => new = atlas::atlas_of(new),
+        Some(AtlasRole::Use) => {
+            (new.atlas, new.warm_start_from, new.repeat_results) = (AtlasRole::Use, WarmStartFrom::Root, Some(false));
+        }
+    }
     new.name = Some(match &clone.name {
         Some(name) => name.clone(),
+        None if clone.atlas == Some(AtlasRole::Make) => {
+            study_name::free(writer, reach, &study_name::marked(&from.plan.name, " (atlas)")).await?
+        }
         None => study_name::free(writer, reach, &study_name::marked(&from.plan.name, " (clone)")).await?,
     });
     new.seed = clone.seed.unwrap_or(new.seed);

@@ -4,6 +4,7 @@
 use crate::access::Reach;
 use crate::error::{Error, FieldError};
 use crate::printable::{self, compared};
+use gaitwright_store::studies::AtlasRole;
 use gaitwright_store::{Connection, StudyId, studies};
 use std::collections::BTreeSet;
 
@@ -31,6 +32,15 @@ fn free_of(taken: &BTreeSet<String>, name: &str) -> String {
         number += 1;
     }
     free
+}
+
+/// The name of a study for which nobody chose one, if it is free.
+pub(super) fn by_default(pseudonym: &str, muscles: bool, seed: u64, atlas: AtlasRole) -> String {
+    let variant = if muscles { "with muscles" } else { "without muscles" };
+    match atlas {
+        AtlasRole::Make => format!("Atlas of {pseudonym}, {variant}"),
+        AtlasRole::None | AtlasRole::Use => format!("{pseudonym}, {variant}, seed {seed}"),
+    }
 }
 
 /// A name with a mark at its end, shortened if it would be too long.

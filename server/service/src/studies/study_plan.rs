@@ -4,14 +4,14 @@ use super::bound_grid::{self, RequestedSearchSpace};
 use super::seed::MAX_SEED;
 use super::simulated_walks_setting::SimulatedWalksSetting;
 use super::subject::{self, NewSubject};
-use super::{built_in_entries, membership, simulated_walks, study_name, study_plan_schemas};
+use super::{atlas_role, built_in_entries, membership, simulated_walks, study_name, study_plan_schemas};
 use crate::access::{Caller, Reach};
 use crate::error::{Error, FieldError};
 use crate::printable;
 use gait_learner::{LearnerError, LearnerSettings};
 use gait_optimizer::{GaitSettings, ModelError, SolveOptions, Subject as Body, TunedBounds};
 use gaitwright_store::audit::{self, Actor};
-use gaitwright_store::studies::{AnswerSource, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, AtlasRole, Evaluation, Study, StudyPlan, StudyState, WarmStartFrom};
 use gaitwright_store::{
     Connection, DeviceId, ReferenceGaitId, StudyId, SubjectId, Writer, devices, events, members, reference_gaits,
     studies, subjects,
@@ -84,6 +84,9 @@ pub struct NewStudy {
     /// The gait from which trials are warm-started.
     #[serde(default = "incumbent")]
     pub warm_start_from: WarmStartFrom,
+    /// What the study does with an atlas. Anything but `none` needs `root` as `warm_start_from`.
+    #[serde(default)]
+    pub atlas: AtlasRole,
     /// Simulated walks with each gait. By default, the service simulates none.
     #[serde(default)]
     pub simulated_walks: SimulatedWalksSetting,
@@ -147,6 +150,7 @@ impl NewStudy {
             unchanged_limit: None,
             repeat_results: None,
             warm_start_from: incumbent(),
+            atlas: AtlasRole::None,
             simulated_walks: SimulatedWalksSetting::default(),
             parallel_trials: one(),
             priority: 0,
@@ -178,6 +182,7 @@ impl NewStudy {
             unchanged_limit: plan.unchanged_limit,
             repeat_results: Some(plan.repeat_results),
             warm_start_from: plan.warm_start_from,
+            atlas: plan.atlas,
             simulated_walks: plan.simulated_walks.into(),
             parallel_trials: plan.parallel_trials,
             priority: plan.priority,
@@ -289,9 +294,10 @@ async fn check_for(
         Some(id) => reference_gaits::get(db, id).await?.id,
         None => built_in_entries::reference_gait(db).await?.id,
     };
-    let variant = if new.muscles { "with muscles" } else { "without muscles" };
     let name = match new.name.as_deref().map(str::trim) {
-        None => study_name::free(db, reach, &format!("{}, {variant}, seed {}", pseudonym, new.seed)).await?,
+        None => {
+            study_name::free(db, reach, &study_name::by_default(pseudonym, new.muscles, new.seed, new.atlas)).await?
+        }
         Some(name) => study_name::checked(db, reach, name, None).await?,
     };
     let search_space = match new.search_space {
@@ -314,8 +320,9 @@ async fn check_for(
         number_of_trials: new.number_of_trials,
         solve_seconds_budget: new.solve_seconds_budget,
         unchanged_limit: new.unchanged_limit,
-        repeat_results: new.repeat_results.unwrap_or(new.learner.repeats),
+        repeat_results: new.repeat_results.unwrap_or(new.atlas == AtlasRole::None && new.learner.repeats),
         warm_start_from: new.warm_start_from,
+        atlas: new.atlas,
         simulated_walks: new.simulated_walks.into(),
         parallel_trials: new.parallel_trials,
         priority: new.priority,
@@ -345,6 +352,7 @@ pub(super) fn check_plan(plan: &StudyPlan) -> Result<(), Error> {
         return Err(Error::invalid("seed", plan.seed, &format!("0 to {MAX_SEED}")));
     }
     simulated_walks::check(plan)?;
+    atlas_role::check(plan)?;
     let within = |part: &'static str| move |error: ModelError| FieldError::from(error).within(part);
     plan.gait_settings.validate().map_err(within("gait_settings"))?;
     plan.solve_options.validate().map_err(within("solve_options"))?;

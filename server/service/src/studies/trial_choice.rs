@@ -1,20 +1,25 @@
 //! Chooses the next trial of a study, as a pure function of its snapshot.
 
 use super::actions_with_known_gait::actions_with_known_gait;
+use super::atlas;
 use super::bound_grid;
 use super::excluded_actions::excluded_without_result;
 use super::seed::{Purpose, derive};
 use super::snapshot::StudySnapshot;
-use super::warm_start_choice::warm_start_of_next;
-use gait_learner::{LearnerError, Posterior, ProposalReason, propose, propose_outside};
+use super::warm_start_choice::{root_trial, warm_start_of_next};
+use crate::error::Error;
+use gait_learner::{ActionIndex, LearnerError, Posterior, ProposalReason, propose, propose_outside};
 use gait_optimizer::ModelError;
 use gaitwright_compute::OnPool;
 use gaitwright_store::studies::WarmStartFrom;
 use gaitwright_store::trials::NewTrial;
-use thiserror::Error;
+
+/// Follows the reason of a trial whose gait the atlas has. All actions of a gait are one for the learner, so the trial has the
+/// action with which the atlas found it.
+const FROM_ATLAS: &str = "; its gait is in the atlas";
 
 /// Why no trial could be chosen.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum ChoiceError {
     /// The learner failed.
     #[error(transparent)]
@@ -22,6 +27,15 @@ pub enum ChoiceError {
     /// The action gives invalid bounds.
     #[error(transparent)]
     Bounds(#[from] ModelError),
+}
+
+impl From<ChoiceError> for Error {
+    fn from(error: ChoiceError) -> Self {
+        match error {
+            ChoiceError::Learner(error) => Self::Learner(error),
+            ChoiceError::Bounds(error) => error.into(),
+        }
+    }
 }
 
 impl ChoiceError {
@@ -50,13 +64,35 @@ pub fn next_trial(_: &OnPool, snapshot: &StudySnapshot, posterior: &Posterior) -
     } else {
         propose(&plan.search_space, &log, &excluded, &plan.learner, seed)?
     };
+    let in_atlas = atlas::representative(snapshot, proposal.action);
+    let action_index = in_atlas.unwrap_or(proposal.action);
+    let mut reason = reason_in_words(proposal.reason, snapshot.has_best_action());
+    if in_atlas.is_some() {
+        reason.push_str(FROM_ATLAS);
+    }
     Ok(NewTrial {
         number,
-        action_index: proposal.action,
-        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, proposal.action)?,
-        reason: reason_in_words(proposal.reason, snapshot.has_best_action()),
+        action_index,
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
+        reason,
         best_before: proposal.best.and_then(|action| snapshot.trial_of(action)).map(|trial| trial.id),
         warm_started_from: warm_start_of_next(snapshot, posterior)?,
+    })
+}
+
+/// The trial of an action that an atlas solves next.
+///
+/// # Errors
+/// When the action gives invalid bounds.
+pub(super) fn trial_of_atlas(snapshot: &StudySnapshot, action_index: ActionIndex) -> Result<NewTrial, ChoiceError> {
+    let plan = &snapshot.study.plan;
+    Ok(NewTrial {
+        number: snapshot.trials.last().map_or(1, |trial| trial.number + 1),
+        action_index,
+        action: bound_grid::bounds_of(&plan.search_space, plan.base_bounds, action_index)?,
+        reason: "next action without a known gait".to_owned(),
+        best_before: None,
+        warm_started_from: root_trial(snapshot),
     })
 }
 

@@ -18,7 +18,7 @@ pub fn warm_start_of_next(snapshot: &StudySnapshot, posterior: &Posterior) -> Re
 }
 
 /// The first trial with a gait. The root gait stays the same whether or not it is executable.
-fn root_trial(snapshot: &StudySnapshot) -> Option<TrialId> {
+pub(super) fn root_trial(snapshot: &StudySnapshot) -> Option<TrialId> {
     snapshot.trials.iter().find(|trial| trial.state.has_gait()).map(|trial| trial.id)
 }
 

@@ -1,15 +1,17 @@
 //! Stored studies.
 
+mod atlases;
 mod lists;
 mod plan;
 mod simulated_walks;
 mod study_state;
 
+pub use atlases::finished_atlas;
 pub use lists::{
     StudyFilter, active, awaiting_raters, ended_before, names, of_subject, of_subject_with_safety_reports, open_of,
     page, tags, waiting_for_people, with_safety_reports,
 };
-pub use plan::{AnswerSource, Evaluation, StudyPlan, WarmStartFrom};
+pub use plan::{AnswerSource, AtlasRole, Evaluation, StudyPlan, WarmStartFrom};
 pub use simulated_walks::{SimulatedWalks, SimulatedWalksEffect};
 pub use study_state::StudyState;
 
@@ -62,7 +64,7 @@ pub async fn insert(
         "insert into studies (id, name, subject_id, device_id, reference_gait_id, muscles, gait_settings, \
          solve_options, base_bounds, search_space, learner, answer_source, number_of_trials, parallel_trials, priority, \
          seed, state, evaluation, solve_seconds_budget, unchanged_limit, cloned_from, created_at, updated_at, \
-         height_m, body_mass_kg, repeat_results, warm_start_from, simulated_walks) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         height_m, body_mass_kg, repeat_results, warm_start_from, atlas, simulated_walks) values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )
     .bind(id)
     .bind(&plan.name)
@@ -91,6 +93,7 @@ pub async fn insert(
     .bind(plan.body.body_mass_kg)
     .bind(plan.repeat_results)
     .bind(plan.warm_start_from.as_str())
+    .bind(plan.atlas.as_str())
     .bind(json_columns::to_text("simulated walks", &plan.simulated_walks)?)
     .execute(db)
     .await?;
@@ -214,6 +217,7 @@ fn from_row(row: &SqliteRow) -> StoreResult<Study> {
             unchanged_limit: row.try_get("unchanged_limit")?,
             repeat_results: row.try_get("repeat_results")?,
             warm_start_from: row.try_get::<&str, _>("warm_start_from")?.parse()?,
+            atlas: row.try_get::<&str, _>("atlas")?.parse()?,
             simulated_walks: json_columns::column(row, "simulated_walks")?,
             parallel_trials: row.try_get("parallel_trials")?,
             priority: row.try_get("priority")?,

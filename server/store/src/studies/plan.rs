@@ -103,6 +103,42 @@ impl FromStr for WarmStartFrom {
     }
 }
 
+/// What a study does with an atlas, which has the gait of every action of a search space: `none`, nothing; `make`, the study
+/// is an atlas, whose trials find the gait of every action; `use`, the study tunes, and takes each gait at once from a finished
+/// atlas of the same problem, if there is one on record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AtlasRole {
+    /// Nothing.
+    #[default]
+    None,
+    /// Finds the gait of every action.
+    Make,
+    /// Takes its gaits from an atlas.
+    Use,
+}
+
+impl AtlasRole {
+    /// The name in the record and in REST.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Make => "make",
+            Self::Use => "use",
+        }
+    }
+}
+
+impl FromStr for AtlasRole {
+    type Err = StoreError;
+    fn from_str(text: &str) -> StoreResult<Self> {
+        [Self::None, Self::Make, Self::Use]
+            .into_iter()
+            .find(|role| role.as_str() == text)
+            .ok_or_else(|| StoreError::unknown_value("role of an atlas", text))
+    }
+}
+
 /// Set-up of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StudyPlan {
@@ -143,6 +179,8 @@ pub struct StudyPlan {
     pub repeat_results: bool,
     /// The gait from which trials are warm-started.
     pub warm_start_from: WarmStartFrom,
+    /// What the study does with an atlas.
+    pub atlas: AtlasRole,
     /// Simulated walks with each gait.
     pub simulated_walks: SimulatedWalks,
     /// Number of trials that run in parallel. Only 1 gives the published, reproducible order.

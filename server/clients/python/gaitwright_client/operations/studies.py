@@ -11,6 +11,7 @@ from typing import Optional, cast
 from ..events import Event, follow
 from ..paging import Pages
 from ..schemas import (
+    Atlas,
     HistoryEntry,
     Import,
     NewStudy,
@@ -67,7 +68,7 @@ class StudiesMethods(Transport):
 
         Starts the study, unless `start` is false.
 
-        Fields: subject_id; optionally answer_source, base_bounds, device_id, evaluation, gait_settings, learner,
+        Fields: subject_id; optionally answer_source, atlas, base_bounds, device_id, evaluation, gait_settings, learner,
         muscles, name, number_of_trials, parallel_trials, priority, reference_gait_id, repeat_results, restricted,
         search_space, seed, simulated_walks, solve_options, solve_seconds_budget, start, unchanged_limit,
         warm_start_from.
@@ -115,6 +116,21 @@ class StudiesMethods(Transport):
         """
         return self.request_bytes("GET", "/api/v1/studies/{id}/archive", {"id": study_id})
 
+    def get_atlas(self, study_id: StudyId) -> Atlas:
+        """Get the atlas of a study.
+
+        How many actions have a result, and the best gait so far. Start an atlas with `POST /studies/{id}/clone` and
+        `atlas` `make`; the commands for studies pause, resume and stop it.
+        """
+        return cast(Atlas, self.request_json("GET", "/api/v1/studies/{id}/atlas", {"id": study_id}))
+
+    def get_atlas_csv(self, study_id: StudyId) -> str:
+        """Download the atlas as CSV.
+
+        The bounds of each action that has a result, and the gait that it has.
+        """
+        return self.request_text("GET", "/api/v1/studies/{id}/atlas.csv", {"id": study_id})
+
     def clone_study(
         self,
         study_id: StudyId,
@@ -126,7 +142,7 @@ class StudiesMethods(Transport):
 
         Creates a study with the same set-up, without the trials.
 
-        Fields: optionally answer_source, muscles, name, number_of_trials, seed, start.
+        Fields: optionally answer_source, atlas, muscles, name, number_of_trials, seed, start.
         """
         return cast(
             StudyWithCommands,

@@ -2,7 +2,7 @@
 
 use crate::format;
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::studies::{Evaluation, StudyState};
+use gaitwright_store::studies::{AtlasRole, Evaluation, StudyState};
 use gaitwright_store::trials::SolveTimes;
 
 /// With fewer finished solves the study itself gives no estimate: the first one starts cold and takes longer than the others.
@@ -14,6 +14,9 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize, 
     let study = &snapshot.study;
     if study.state != StudyState::Running {
         return String::new();
+    }
+    if study.plan.atlas == AtlasRole::Make {
+        return "The page of the atlas says about how long it still takes.".to_owned();
     }
     if study.plan.evaluation == Evaluation::Script {
         return "The time left depends on the script that evaluates the trials.".to_owned();

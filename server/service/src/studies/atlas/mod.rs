@@ -1,17 +1,25 @@
-//! An atlas: the gait of every action of Table I, from one root gait. It does not depend on the number of workers, and a killed
-//! process can continue it.
+//! An atlas: the gait of every action, from one root gait. It does not depend on the number of workers, and a killed process can
+//! continue it. The command `atlas` makes that of Table I in a file; a study makes one in the record.
 
+mod action_map;
 mod best_certified_gait;
 mod family;
 mod gait_map;
 mod gait_values;
+mod of_study;
+mod progress;
 mod progress_file;
 mod solved_action;
+mod study_atlas;
 
 pub use best_certified_gait::{BestCertifiedGait, BestCertifiedGaitSearch};
 pub use gait_map::{AtlasRow, GaitMap};
 pub use gait_values::GaitValues;
+pub use of_study::atlas_of;
+pub(super) use of_study::{AtlasStep, next_of, representative};
+pub use progress::{AtlasProgress, progress};
 pub use solved_action::SolvedAction;
+pub use study_atlas::{AtlasResult, StudyAtlas};
 
 use super::bound_grid;
 use super::problem_file::SolveInput;
@@ -24,10 +32,6 @@ use progress_file::ProgressFile;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-
-/// Number of solves between two looks at which actions have a known gait. A constant, so that the atlas does not depend
-/// on the number of workers.
-const BATCH: usize = 16;
 
 /// Makes or continues an atlas. `start` is the warm start of the root, which otherwise is a cold start; `progress` keeps the
 /// solves until [`Finished::forget_progress`]. Calls `observer` before each batch. `None` if cancelled.
@@ -122,7 +126,7 @@ fn solve_all(
 ) -> Result<bool, Error> {
     loop {
         observer(map);
-        let batch = map.next_batch(BATCH);
+        let batch = map.next_batch();
         if batch.is_empty() {
             return Ok(true);
         }
