@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use axum::http::StatusCode;
+use gait_learner::{Dimension, SearchSpace};
+use gaitwright_service::studies::atlas;
 use gaitwright_store::studies::{AnswerSource, StudyState};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
@@ -47,6 +49,14 @@ async fn csv_endpoints_return_no_formulas() {
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (6, AnswerSource::Both)).await;
     service.wait_for(study, &[StudyState::Finished]).await;
+    let heights = Dimension { name: "a5".to_owned(), values: vec![0.0, 0.013, 0.026], lengthscale: 0.013 };
+    let space = SearchSpace::new(vec![heights]).unwrap();
+    let atlas = service.study(|new| {
+        new.search_space = Some(space.into());
+        *new = atlas::atlas_of(new.clone());
+    });
+    let atlas = atlas.await;
+    service.wait_for(atlas, &[StudyState::Finished]).await;
     let trials = service.trials(study).await;
     let good: Vec<_> = trials.iter().filter(|t| t.state.as_str() == "converged").map(|t| t.id).collect();
     let mut given = Vec::new();
@@ -76,7 +86,13 @@ async fn csv_endpoints_return_no_formulas() {
         if !content.contains_key("text/csv") || path == "/api/v1/measurement-files/{id}/content" {
             continue;
         }
-        let id = if path.contains("/trials/{id}") { good[0].to_string() } else { study.to_string() };
+        let id = if path.contains("/trials/{id}") {
+            good[0].to_string()
+        } else if path.ends_with("/atlas.csv") {
+            atlas.to_string()
+        } else {
+            study.to_string()
+        };
         let path = path.replace("{id}", &id);
         let addresses: Vec<String> = if path.contains("{file}") {
             let page = match path.split("/figures").next().unwrap().rsplit('/').nth(1) {
