@@ -103,7 +103,8 @@ mod tests {
 
     #[test]
     fn first_column_is_the_time_whatever_its_name() {
-        let rows: String = (0..20).map(|row| format!("{},{}\n", f64::from(row) / 100.0, 2 * row)).collect();
+        let rows: Vec<String> = (0..20).map(|row| format!("{},{}\n", f64::from(row) / 100.0, 2 * row)).collect();
+        let rows = rows.concat();
         let file = AngleTable::from_csv("a.csv", &format!("# treadmill\nTime (s),Left knee\n{rows}")).unwrap();
         assert_eq!((file.columns(), file.unit()), (&["Left knee".to_owned()][..], None));
         assert!(file.values("Time (s)").is_none());

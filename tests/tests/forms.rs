@@ -192,7 +192,7 @@ async fn answer_is_retracted_through_its_link_in_its_own_study_only() {
     let form = format!("saved={id}&author=K&reason=typo");
     for elsewhere in [UNKNOWN.to_owned(), other.to_string()] {
         let answer = service.post_text(&format!("/studies/{elsewhere}/retract"), FORM, &form).await;
-        is_page(&answer, StatusCode::NOT_FOUND, "There is no ");
+        is_page(&answer, StatusCode::NOT_FOUND, "does not exist");
     }
     let read = service.fetch(&format!("/api/v1/preferences/{id}")).await.json();
     assert_eq!(read["retraction"], json!(null), "nothing was retracted");
@@ -1098,7 +1098,7 @@ async fn clone_has_the_set_up_of_its_study_with_relaxed_bounds() {
     let body = format!("{STUDY}&subject={subject}&number_of_trials=1&seed=8&values_a5=0,0.02&like={study}");
     let clone = service.get(made(&service.post_text("/studies/new", FORM, &body).await)).await.plan;
     assert_eq!((clone.seed, clone.priority, clone.solve_seconds_budget), (8, 4, Some(500.0)), "the rest is copied");
-    is_page(&service.fetch(&format!("/studies/new?like={UNKNOWN}")).await, StatusCode::NOT_FOUND, "There is no");
+    is_page(&service.fetch(&format!("/studies/new?like={UNKNOWN}")).await, StatusCode::NOT_FOUND, "does not exist");
     is_page(
         &service.fetch(&format!("/studies/new?like={study}&relax=a7%3D900")).await,
         StatusCode::UNPROCESSABLE_ENTITY,
@@ -1121,9 +1121,13 @@ async fn equal_names_are_refused_or_numbered_without_naming_hidden_studies() {
     let secret = made(&send_as(&admin, &body("Secret", "&restricted=on")).await);
     let clone = format!("/studies/new?like={secret}");
     assert_eq!(send(&service, &admin, &Method::GET, &clone, "", "").await.status, StatusCode::OK);
-    is_page(&send(&service, &clinician, &Method::GET, &clone, "", "").await, StatusCode::NOT_FOUND, "no such study");
+    is_page(
+        &send(&service, &clinician, &Method::GET, &clone, "", "").await,
+        StatusCode::NOT_FOUND,
+        "This study does not exist",
+    );
     let like = format!("&like={secret}");
-    is_page(&send_as(&clinician, &body("Copy", &like)).await, StatusCode::NOT_FOUND, "no such study");
+    is_page(&send_as(&clinician, &body("Copy", &like)).await, StatusCode::NOT_FOUND, "This study does not exist");
     made(&send_as(&admin, &body("Open", "")).await);
     is_page(&send_as(&admin, &body("Secret", "")).await, StatusCode::UNPROCESSABLE_ENTITY, "Secret (2)");
     is_page(&send_as(&clinician, &body("Open", "")).await, StatusCode::UNPROCESSABLE_ENTITY, "Open (2)");

@@ -19,7 +19,8 @@ use serde_json::{Value, json};
 const NONSENSE: &str = "%07%07";
 
 /// Routes without a field that a person fills in, with the reason.
-const WITHOUT_FIELDS: [(&str, &str); 17] = [
+const WITHOUT_FIELDS: [(&str, &str); 18] = [
+    ("/studies/{id}/atlas", "one button"),
     ("/studies/new/check", "answers the script of the form of a new study with the same sentences"),
     ("/studies/sample", "a button"),
     ("/studies/{id}/undo", "a button"),
