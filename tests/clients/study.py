@@ -36,7 +36,7 @@ from gaitwright_client.models import (
     Evaluation,
     Job,
     JobState,
-    MilestonePage,
+    HistoryEntryPage,
     NewPreference,
     NewStudy,
     NewSubject,
@@ -124,7 +124,7 @@ def by_script(client: Client, subject: UUID) -> None:
         given(Trial, tell_result.sync(trial.id, client=client, body=told))
     trials = trials_of(client, study.id)
     assert [trial.number for trial in trials] == list(range(1, TRIALS + 1)), trials
-    best = given(MilestonePage, list_study_history.sync(study.id, client=client)).items[-1]
+    best = given(HistoryEntryPage, list_study_history.sync(study.id, client=client)).items[-1]
     wait_until(client, study.id, StudyState.FINISHED)
     print(f"python: {len(trials)} trials, best: trial {best.number}, {best.gait_rmse_rad:.4f} rad")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Callable, Optional, Union, cast, overload
 
 from .operations import Operations
-from .schemas import Job, StudyView
+from .schemas import Job, StudyWithCommands
 from .waiting import JobFailed, until
 
 
@@ -25,21 +25,21 @@ class Client(Operations):
     @overload
     def wait(
         self,
-        work: StudyView,
+        work: StudyWithCommands,
         *,
-        progress: Optional[Callable[[StudyView], object]] = None,
+        progress: Optional[Callable[[StudyWithCommands], object]] = None,
         timeout_s: Optional[float] = None,
         poll_s: float = 1.0,
-    ) -> StudyView: ...
+    ) -> StudyWithCommands: ...
 
     def wait(
         self,
-        work: Union[Job, StudyView],
+        work: Union[Job, StudyWithCommands],
         *,
-        progress: Union[Callable[[Job], object], Callable[[StudyView], object], None] = None,
+        progress: Union[Callable[[Job], object], Callable[[StudyWithCommands], object], None] = None,
         timeout_s: Optional[float] = None,
         poll_s: float = 1.0,
-    ) -> Union[Job, StudyView]:
+    ) -> Union[Job, StudyWithCommands]:
         """Waits until a job is done or a study no longer runs, and returns its new state.
 
         `progress` is called with the job or study at first and after each change. A job that failed or was cancelled
@@ -51,7 +51,7 @@ class Client(Operations):
             if job["state"] != "done":
                 raise JobFailed(job)
             return job
-        look = cast(Optional[Callable[[StudyView], object]], progress)
+        look = cast(Optional[Callable[[StudyWithCommands], object]], progress)
         return until(lambda: self.get_study(work["id"]), study_ended, look, timeout_s, poll_s)
 
 
@@ -59,5 +59,5 @@ def job_ended(job: Job) -> bool:
     return job["state"] not in ("queued", "running")
 
 
-def study_ended(study: StudyView) -> bool:
+def study_ended(study: StudyWithCommands) -> bool:
     return study["state"] != "running"
