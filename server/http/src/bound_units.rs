@@ -22,12 +22,12 @@ pub(crate) fn all_shown(name: &str, values: &[f64]) -> Vec<f64> {
     values.iter().map(|value| shown(name, *value)).collect()
 }
 
-/// The same without its unit: `17.2`.
+/// The value of a bound as text without its unit: `17.2`.
 pub(crate) fn number(name: &str, value: f64) -> String {
     format::exactly(shown(name, value))
 }
 
-/// The same with its unit: `17.2°`.
+/// The value of a bound as text with its unit: `17.2°`.
 pub(crate) fn in_unit(name: &str, value: f64) -> String {
     with_unit(number(name, value), unit(name))
 }

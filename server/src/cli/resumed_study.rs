@@ -5,7 +5,7 @@ use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_store::audit::Actor;
-use gaitwright_store::studies::Study;
+use gaitwright_store::studies::{AtlasRole, Study};
 use gaitwright_store::{Store, commit, studies, trials};
 
 /// The unfinished study with the same settings, or a new one.
@@ -17,7 +17,12 @@ pub(super) async fn resumed_or_new(store: &Store, new: NewStudy) -> Result<Study
     let study = if let Some(study) = unfinished {
         let done = trials::counts(&mut writer, study.id).await?;
         let ended = done.total - done.open;
-        tell(&format!("continuing study {}: {ended} of {} trials done", study.id, study.plan.number_of_trials));
+        // How many trials an atlas needs is known at its end.
+        let of_all = match study.plan.atlas {
+            AtlasRole::Make => String::new(),
+            AtlasRole::None | AtlasRole::Use => format!(" of {}", study.plan.number_of_trials),
+        };
+        tell(&format!("continuing study {}: {ended}{of_all} trials done", study.id));
         study
     } else {
         study_plan::create(&mut writer, &Actor::terminal(), Reach::Every, new).await?

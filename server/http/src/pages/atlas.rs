@@ -4,6 +4,7 @@ use super::page_chart::PageChart;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
+use crate::bound_units::in_unit;
 use crate::extractors::Params;
 use crate::figures::atlas_maps::{chosen, dimensions, maps};
 use crate::figures::maps_over_two_bounds::{AxisChoice, DimensionChoice};
@@ -60,7 +61,9 @@ impl BestRow {
         let trial = result.trial;
         let space = &study.plan.search_space;
         let bounds = space.dimensions().iter().zip(space.values(result.action));
-        let bounds: Vec<String> = bounds.map(|(dimension, value)| format!("{} = {value}", dimension.name)).collect();
+        let bounds: Vec<String> = bounds
+            .map(|(dimension, value)| format!("{} = {}", dimension.name, in_unit(&dimension.name, value)))
+            .collect();
         Self {
             trial: (trial.id, trial.number),
             rmse: decimal(trial.gait_rmse_rad),

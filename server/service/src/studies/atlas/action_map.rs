@@ -5,8 +5,8 @@ use gait_learner::{ActionIndex, SearchSpace};
 use gait_optimizer::UnchangedBound;
 use std::ops::Range;
 
-/// Number of solves between two looks at which actions have a known gait. A constant, so that an atlas does not depend on the
-/// number of workers.
+/// Number of solves in a batch. The known gaits are updated after each batch. A constant, so that an atlas does not depend on
+/// the number of workers.
 pub(in super::super) const BATCH: usize = 16;
 
 /// The solve of each action. Solves have places, from 0, the root.

@@ -1,7 +1,7 @@
 //! The results of the study of an atlas: the trial that has the gait of each action.
 
 use super::of_study::replayed;
-use super::progress::{AtlasProgress, progress};
+use super::progress::AtlasProgress;
 use crate::error::Error;
 use gait_learner::ActionIndex;
 use gaitwright_compute::OnPool;
@@ -47,13 +47,13 @@ impl StudyAtlas {
     ///
     /// # Errors
     /// [`Error::Conflict`] if the study makes no atlas.
-    pub fn of(pool: &OnPool, plan: &StudyPlan, trials: &[Trial]) -> Result<Self, Error> {
+    pub fn of(_: &OnPool, plan: &StudyPlan, trials: &[Trial]) -> Result<Self, Error> {
         if plan.atlas != AtlasRole::Make {
             return Err(Error::conflict("This study makes no atlas."));
         }
         let replay = replayed(&plan.search_space, trials);
         Ok(Self {
-            progress: progress(pool, plan, trials),
+            progress: AtlasProgress::of(&replay),
             numbers: replay.map.gait_numbers(),
             place_of: replay.map.solves().collect(),
             trials: replay.trials.into_iter().cloned().collect(),
