@@ -229,6 +229,7 @@ mod tests {
             rows: ("a6: lean, rad".to_owned(), vec![0.1]),
             cells: vec![vec![one(0.25), one(-0.5)]],
             range: (-0.5, 0.25),
+            has_contours: true,
         };
         let figure = Figure::map("a5-a6", map);
         assert_eq!(figure.name, "a5-a6-utility");

@@ -61,19 +61,19 @@ pub(crate) fn maps(
         let below = if names.len() > NAMED { String::new() } else { names.join(" ") };
         result.gait.map(|_| (names.len() as f64, names.len().to_string(), below))
     };
-    let of: [(&str, Shown<'_>); 3] =
-        [("Gait RMSE, rad", &rmse), ("Cost of transport", &cost), ("Active bounds", &active)];
+    let of: [(&str, Shown<'_>, bool); 3] =
+        [("Gait RMSE, rad", &rmse, true), ("Cost of transport", &cost, true), ("Active bounds", &active, false)];
     let axis = |place: usize| {
         let dimension = &space.dimensions()[place];
         let label = format!("{}: {}", dimension.name, meaning(&dimension.name));
         (label, bound_units::all_shown(&dimension.name, &dimension.values))
     };
     of.into_iter()
-        .map(|(title, value)| {
+        .map(|(title, value, has_contours)| {
             let cells = tiles(atlas, space, (right, down), held, value)?;
             let values = || cells.iter().flatten().map(|tile| tile.value).filter(|value| value.is_finite());
             let range = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-            Ok(HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range })
+            Ok(HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range, has_contours })
         })
         .collect()
 }

@@ -121,7 +121,17 @@ pub(crate) fn maps(
     };
     let draw = |title: &str, cells, range| {
         let group = format!("{} {}", space.dimensions()[right].name, space.dimensions()[down].name);
-        Figure::map(&group, HeatMap { title: title.to_owned(), columns: axis(right), rows: axis(down), cells, range })
+        Figure::map(
+            &group,
+            HeatMap {
+                title: title.to_owned(),
+                columns: axis(right),
+                rows: axis(down),
+                cells,
+                range,
+                has_contours: true,
+            },
+        )
     };
     let figures = vec![draw("Utility", utility, range), draw("Probability of converging", converging, (0.0, 1.0))];
     Ok(Maps { dimensions, held, figures })

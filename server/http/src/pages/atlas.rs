@@ -150,8 +150,8 @@ fn show(
 
 /// The text below each map.
 const NOTES: [&str; 3] = [
-    "Lines connect equal values. The frame marks the gait with the lowest Gait RMSE; – means that the action has no result yet.",
-    "Lines connect equal values.",
+    "Lines, if any, connect equal values. The frame marks the gait with the lowest Gait RMSE; – means that the action has no result yet.",
+    "Lines, if any, connect equal values.",
     "The number of bounds that cannot move without changing the gait, and their names.",
 ];
 
