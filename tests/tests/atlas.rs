@@ -187,7 +187,7 @@ async fn atlas_is_made_and_shown_through_rest_and_pages() {
 
     let page = service.fetch(&format!("/studies/{atlas}/atlas?x=a5&y=a6")).await.text;
     for part in
-        ["648 of 648 actions have a result", "Active bounds", ">no gait<", "lowest Gait RMSE with a passed certificate"]
+        ["648 of 648 actions have a result", "Active bounds", ">no gait<", "Lowest Gait RMSE with a passed certificate"]
     {
         assert!(page.contains(part), "{part}: {page}");
     }
