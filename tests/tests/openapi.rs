@@ -326,7 +326,7 @@ fn every_list_states_its_order() {
 }
 
 /// The first word of an operation says what it does, and which success it has: 201 and the address of what it makes, 202
-/// and the job, or 200.
+/// and the job, or 200. Every operation has a description beside its summary.
 #[test]
 fn operation_is_named_by_what_it_does_and_responds_accordingly() {
     let document: Value = serde_json::from_str(&openapi::text().unwrap()).unwrap();
@@ -336,6 +336,7 @@ fn operation_is_named_by_what_it_does_and_responds_accordingly() {
             let what = format!("{method} {path}");
             let verb = operation["operationId"].as_str().unwrap().split('_').next().unwrap();
             let summary = operation["summary"].as_str().unwrap().to_lowercase();
+            assert!(operation["description"].as_str().is_some_and(|text| text.ends_with('.')), "{what} has no description");
             let said = summary.split(' ').next().unwrap();
             assert!(said == verb || (verb, said) == ("get", "download"), "{what}: {verb}, but {summary}");
             let has = |status: &str| !operation["responses"][status].is_null();

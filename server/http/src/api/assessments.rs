@@ -69,6 +69,8 @@ pub(super) async fn create(
 }
 
 /// Get an assessment
+///
+/// A retracted one too, with its retraction.
 #[utoipa::path(
     get,
     path = "/assessments/{id}",

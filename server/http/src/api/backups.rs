@@ -44,6 +44,8 @@ pub(super) async fn create(State(app): State<AppState>, request: Idempotent<Admi
 }
 
 /// Get a backup
+///
+/// File name, size and time of the backup, without its contents.
 #[utoipa::path(
     get,
     path = "/backups/{id}",

@@ -70,6 +70,8 @@ pub(super) async fn create(
 }
 
 /// Get a device
+///
+/// With its whole definition: masses, lengths and limits of the prosthetic joints.
 #[utoipa::path(
     get,
     path = "/devices/{id}",

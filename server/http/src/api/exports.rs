@@ -59,6 +59,8 @@ pub(super) async fn problem(
 }
 
 /// Download the gait as an OpenSim motion file
+///
+/// One stride from right heel strike, with a column for each coordinate.
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.mot",

@@ -35,6 +35,8 @@ pub(super) struct ShownGait {
 }
 
 /// Download a figure of a study
+///
+/// Progress, answers, and curves of the recommended gait; with `other`, of both studies.
 #[utoipa::path(
     get,
     path = "/studies/{id}/figures/{file}",
@@ -121,6 +123,8 @@ pub(super) async fn of_session(
 }
 
 /// Download a figure of the posterior
+///
+/// Effects of the bounds, maps over two bounds, and the trials over the bounds.
 #[utoipa::path(
     get,
     path = "/studies/{id}/analysis/figures/{file}",
@@ -147,6 +151,8 @@ pub(super) async fn of_analysis(
 }
 
 /// Download a figure of a reference gait
+///
+/// Joint angles over the cycle of each leg.
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}/figures/{file}",

@@ -55,6 +55,8 @@ pub(super) async fn get(
 }
 
 /// Download the gait of a trial as CSV
+///
+/// Time, domain, coordinates and their derivatives, torques and ground forces; in a study with muscles, activations.
 #[utoipa::path(
     get,
     path = "/trials/{id}/gait.csv",

@@ -42,6 +42,8 @@ pub(super) async fn list(
 }
 
 /// Get the description of a measurement file
+///
+/// `get_measurement_file_content` has the file itself.
 #[utoipa::path(
     get,
     path = "/measurement-files/{id}",

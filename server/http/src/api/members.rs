@@ -42,6 +42,8 @@ pub(super) async fn of_study(
 }
 
 /// Get the access restriction of a study
+///
+/// A restricted study is visible to administrators and to its members only.
 #[utoipa::path(
     get,
     path = "/studies/{id}/access",

@@ -112,6 +112,8 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
 }
 
 /// Get a preference
+///
+/// A retracted one too, with its retraction.
 #[utoipa::path(
     get,
     path = "/preferences/{id}",

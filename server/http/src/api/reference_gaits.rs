@@ -74,6 +74,8 @@ pub(super) async fn create(
 }
 
 /// Get a reference gait
+///
+/// Its definition has the joint angles over one stride, deviations where there are any, and the provenance.
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}",

@@ -39,6 +39,8 @@ pub(super) async fn list(
 }
 
 /// Get a subject
+///
+/// Height and mass are the corrected ones; `list_subject_corrections` has the earlier ones.
 #[utoipa::path(
     get,
     path = "/subjects/{id}",
@@ -57,6 +59,8 @@ pub(super) async fn get(
 }
 
 /// Create a subject
+///
+/// A pseudonym belongs to one subject. `create_consent` then records the consent of the subject.
 #[utoipa::path(
     post,
     path = "/subjects",

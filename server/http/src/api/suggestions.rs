@@ -73,6 +73,8 @@ pub(super) async fn create(
 }
 
 /// Get a suggestion
+///
+/// A retracted one too, with its retraction.
 #[utoipa::path(
     get,
     path = "/suggestions/{id}",

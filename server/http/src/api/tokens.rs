@@ -49,6 +49,8 @@ pub(super) async fn list(
 }
 
 /// Get a token
+///
+/// A revoked or expired one too. The secret is shown only once, by `create_token`.
 #[utoipa::path(
     get,
     path = "/tokens/{id}",

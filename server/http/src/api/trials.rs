@@ -101,6 +101,8 @@ pub(super) async fn of_study(
 }
 
 /// Get a trial
+///
+/// Its action, state, reason and result. Null where there is none yet.
 #[utoipa::path(
     get,
     path = "/trials/{id}",

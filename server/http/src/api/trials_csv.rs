@@ -14,6 +14,9 @@ use gaitwright_store::{StudyId, TrialId, studies, trials};
 use std::collections::HashMap;
 
 /// Download trials as CSV
+///
+/// One row for each trial: the value of each bound, state, Gait RMSE, cost of transport, violation, iterations, time and
+/// reason. Empty where there is no value yet.
 #[utoipa::path(
     get,
     path = "/studies/{id}/trials.csv",

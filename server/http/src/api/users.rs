@@ -69,6 +69,8 @@ pub(super) async fn list(
 }
 
 /// Get a user
+///
+/// A disabled one too.
 #[utoipa::path(
     get,
     path = "/users/{id}",
@@ -87,6 +89,8 @@ pub(super) async fn get(
 }
 
 /// Create a user
+///
+/// The user has no password yet: `create_sign_in_link` makes a link with which the user signs in and sets one.
 #[utoipa::path(
     post,
     path = "/users",
@@ -161,6 +165,8 @@ pub(super) async fn disable(
 }
 
 /// Enable a user
+///
+/// The password is valid again. Links and tokens that were revoked when the user was disabled stay revoked.
 #[utoipa::path(
     post,
     path = "/users/{id}/enable",

@@ -66,7 +66,10 @@ class AccessMethods(Transport):
         )
 
     def get_study_access(self, study_id: StudyId) -> StudyRestriction:
-        """Get the access restriction of a study."""
+        """Get the access restriction of a study.
+
+        A restricted study is visible to administrators and to its members only.
+        """
         return cast(StudyRestriction, self.request_json("GET", "/api/v1/studies/{id}/access", {"id": study_id}))
 
     def set_study_access(
@@ -184,7 +187,10 @@ class AccessMethods(Transport):
         return cast(CreatedToken, self.request_json("POST", "/api/v1/tokens", body=body, repeatable=False))
 
     def get_token(self, token_id: TokenId) -> Token:
-        """Get a token."""
+        """Get a token.
+
+        A revoked or expired one too. The secret is shown only once, by `create_token`.
+        """
         return cast(Token, self.request_json("GET", "/api/v1/tokens/{id}", {"id": token_id}))
 
     def revoke_token(self, token_id: TokenId, *, idempotency_key: Optional[str] = None) -> Token:
@@ -212,12 +218,17 @@ class AccessMethods(Transport):
     def create_user(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewUser]) -> User:
         """Create a user.
 
+        The user has no password yet: `create_sign_in_link` makes a link with which the user signs in and sets one.
+
         Fields: name, role.
         """
         return cast(User, self.request_json("POST", "/api/v1/users", body=body, key=idempotency_key))
 
     def get_user(self, user_id: UserId) -> User:
-        """Get a user."""
+        """Get a user.
+
+        A disabled one too.
+        """
         return cast(User, self.request_json("GET", "/api/v1/users/{id}", {"id": user_id}))
 
     def disable_user(self, user_id: UserId, *, idempotency_key: Optional[str] = None) -> User:
@@ -228,7 +239,10 @@ class AccessMethods(Transport):
         return cast(User, self.request_json("POST", "/api/v1/users/{id}/disable", {"id": user_id}, key=idempotency_key))
 
     def enable_user(self, user_id: UserId, *, idempotency_key: Optional[str] = None) -> User:
-        """Enable a user."""
+        """Enable a user.
+
+        The password is valid again. Links and tokens that were revoked when the user was disabled stay revoked.
+        """
         return cast(User, self.request_json("POST", "/api/v1/users/{id}/enable", {"id": user_id}, key=idempotency_key))
 
     def create_sign_in_link(self, user_id: UserId) -> SignInLink:

@@ -41,5 +41,8 @@ class DevicesMethods(Transport):
         return cast(Device, self.request_json("POST", "/api/v1/devices", body=body, key=idempotency_key))
 
     def get_device(self, device_id: DeviceId) -> Device:
-        """Get a device."""
+        """Get a device.
+
+        With its whole definition: masses, lengths and limits of the prosthetic joints.
+        """
         return cast(Device, self.request_json("GET", "/api/v1/devices/{id}", {"id": device_id}))

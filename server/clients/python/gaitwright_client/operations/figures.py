@@ -31,7 +31,10 @@ class FiguresMethods(Transport):
         )
 
     def get_reference_gait_figure(self, reference_gait_id: ReferenceGaitId, file: str) -> bytes:
-        """Download a figure of a reference gait."""
+        """Download a figure of a reference gait.
+
+        Joint angles over the cycle of each leg.
+        """
         return self.request_bytes(
             "GET",
             "/api/v1/reference-gaits/{id}/figures/{file}",
@@ -48,6 +51,8 @@ class FiguresMethods(Transport):
     ) -> bytes:
         """Download a figure of the posterior.
 
+        Effects of the bounds, maps over two bounds, and the trials over the bounds.
+
         x: Bound on the horizontal axis of a map. The most important one by default.
 
         y: Bound on the vertical axis of a map. The second most important one by default.
@@ -61,6 +66,8 @@ class FiguresMethods(Transport):
 
     def get_study_figure(self, study_id: StudyId, file: str, *, other: Optional[StudyId] = None) -> bytes:
         """Download a figure of a study.
+
+        Progress, answers, and curves of the recommended gait; with `other`, of both studies.
 
         other: Identifier of a study for comparison.
         """

@@ -312,7 +312,10 @@ class LabMethods(Transport):
         )
 
     def get_measurement_file(self, measurement_file_id: MeasurementFileId) -> MeasurementFile:
-        """Get the description of a measurement file."""
+        """Get the description of a measurement file.
+
+        `get_measurement_file_content` has the file itself.
+        """
         return cast(
             MeasurementFile,
             self.request_json(

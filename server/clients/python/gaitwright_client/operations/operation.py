@@ -59,7 +59,10 @@ class OperationMethods(Transport):
         return cast(Job, self.request_json("POST", "/api/v1/backups", key=idempotency_key))
 
     def get_backup(self, backup_id: BackupId) -> Backup:
-        """Get a backup."""
+        """Get a backup.
+
+        File name, size and time of the backup, without its contents.
+        """
         return cast(Backup, self.request_json("GET", "/api/v1/backups/{id}", {"id": backup_id}))
 
     def list_jobs(

@@ -36,7 +36,10 @@ class PreferencesMethods(Transport):
     """Operations with the tag `preferences`."""
 
     def get_assessment(self, assessment_id: AssessmentId) -> Assessment:
-        """Get an assessment."""
+        """Get an assessment.
+
+        A retracted one too, with its retraction.
+        """
         return cast(Assessment, self.request_json("GET", "/api/v1/assessments/{id}", {"id": assessment_id}))
 
     def retract_assessment(
@@ -88,7 +91,10 @@ class PreferencesMethods(Transport):
         )
 
     def get_preference(self, preference_id: FeedbackId) -> Preference:
-        """Get a preference."""
+        """Get a preference.
+
+        A retracted one too, with its retraction.
+        """
         return cast(Preference, self.request_json("GET", "/api/v1/preferences/{id}", {"id": preference_id}))
 
     def retract_preference(
@@ -253,7 +259,10 @@ class PreferencesMethods(Transport):
         )
 
     def get_suggestion(self, suggestion_id: FeedbackId) -> Suggestion:
-        """Get a suggestion."""
+        """Get a suggestion.
+
+        A retracted one too, with its retraction.
+        """
         return cast(Suggestion, self.request_json("GET", "/api/v1/suggestions/{id}", {"id": suggestion_id}))
 
     def retract_suggestion(

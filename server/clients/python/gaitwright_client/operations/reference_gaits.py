@@ -44,5 +44,8 @@ class ReferenceGaitsMethods(Transport):
         return cast(ReferenceGait, self.request_json("POST", "/api/v1/reference-gaits", body=body, key=idempotency_key))
 
     def get_reference_gait(self, reference_gait_id: ReferenceGaitId) -> ReferenceGait:
-        """Get a reference gait."""
+        """Get a reference gait.
+
+        Its definition has the joint angles over one stride, deviations where there are any, and the provenance.
+        """
         return cast(ReferenceGait, self.request_json("GET", "/api/v1/reference-gaits/{id}", {"id": reference_gait_id}))

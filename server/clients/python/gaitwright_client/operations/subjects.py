@@ -37,12 +37,17 @@ class SubjectsMethods(Transport):
     def create_subject(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewSubject]) -> Subject:
         """Create a subject.
 
+        A pseudonym belongs to one subject. `create_consent` then records the consent of the subject.
+
         Fields: body_mass_kg, height_m, pseudonym; optionally notes.
         """
         return cast(Subject, self.request_json("POST", "/api/v1/subjects", body=body, key=idempotency_key))
 
     def get_subject(self, subject_id: SubjectId) -> Subject:
-        """Get a subject."""
+        """Get a subject.
+
+        Height and mass are the corrected ones; `list_subject_corrections` has the earlier ones.
+        """
         return cast(Subject, self.request_json("GET", "/api/v1/subjects/{id}", {"id": subject_id}))
 
     def list_consents(self, subject_id: SubjectId, *, page_size: Optional[int] = None) -> Pages[Consent]:

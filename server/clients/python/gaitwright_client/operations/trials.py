@@ -66,11 +66,18 @@ class TrialsMethods(Transport):
         )
 
     def get_trials_csv(self, study_id: StudyId) -> str:
-        """Download trials as CSV."""
+        """Download trials as CSV.
+
+        One row for each trial: the value of each bound, state, Gait RMSE, cost of transport, violation, iterations,
+        time and reason. Empty where there is no value yet.
+        """
         return self.request_text("GET", "/api/v1/studies/{id}/trials.csv", {"id": study_id})
 
     def get_trial(self, trial_id: TrialId) -> Trial:
-        """Get a trial."""
+        """Get a trial.
+
+        Its action, state, reason and result. Null where there is none yet.
+        """
         return cast(Trial, self.request_json("GET", "/api/v1/trials/{id}", {"id": trial_id}))
 
     def list_attempts(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[AttemptResult]:
@@ -214,11 +221,17 @@ class TrialsMethods(Transport):
         )
 
     def get_gait_csv(self, trial_id: TrialId) -> str:
-        """Download the gait of a trial as CSV."""
+        """Download the gait of a trial as CSV.
+
+        Time, domain, coordinates and their derivatives, torques and ground forces; in a study with muscles,
+        activations.
+        """
         return self.request_text("GET", "/api/v1/trials/{id}/gait.csv", {"id": trial_id})
 
     def get_opensim_file(self, trial_id: TrialId, *, rate_hz: Optional[float] = None) -> str:
         """Download the gait as an OpenSim motion file.
+
+        One stride from right heel strike, with a column for each coordinate.
 
         rate_hz: Sampling rate, 10 to 5000 Hz. Default 200.
         """
