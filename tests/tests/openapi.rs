@@ -336,7 +336,10 @@ fn operation_is_named_by_what_it_does_and_responds_accordingly() {
             let what = format!("{method} {path}");
             let verb = operation["operationId"].as_str().unwrap().split('_').next().unwrap();
             let summary = operation["summary"].as_str().unwrap().to_lowercase();
-            assert!(operation["description"].as_str().is_some_and(|text| text.ends_with('.')), "{what} has no description");
+            assert!(
+                operation["description"].as_str().is_some_and(|text| text.ends_with('.')),
+                "{what} has no description"
+            );
             let said = summary.split(' ').next().unwrap();
             assert!(said == verb || (verb, said) == ("get", "download"), "{what}: {verb}, but {summary}");
             let has = |status: &str| !operation["responses"][status].is_null();
