@@ -9,6 +9,7 @@ use gaitwright_store::studies::{AtlasRole, StudyState, WarmStartFrom};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{StudyId, attempts};
 use gaitwright_tests::analytic::Analytic;
+use gaitwright_tests::callers::FORM;
 use gaitwright_tests::service::Service;
 use serde_json::json;
 use std::collections::{BTreeSet, HashSet};
@@ -184,6 +185,24 @@ async fn atlas_is_made_and_shown_through_rest_and_pages() {
     assert_eq!(number(&["15", "70", "0.3", "0.013", "0.3", "20"]), number(&["15", "90", "0.5", "0.013", "0.3", "40"]));
     assert_ne!(number(&["15", "70", "0.3", "0.013", "0.3", "20"]), number(&["20", "70", "0.3", "0.013", "0.3", "20"]));
     assert_eq!(number(&["15", "70", "0.3", "0.039", "0.1", "20"]), "");
+    assert_eq!(rows[0][8..13], ["status", "iterations", "objective", "cost_of_transport", "gait_rmse_rad"]);
+    assert_eq!(
+        rows[0][13..],
+        [
+            "gait_rmse_other_rad",
+            "speed_m_s",
+            "stride_length_m",
+            "double_support_percent",
+            "step_time_asymmetry",
+            "peak_hip_torque_nm_kg",
+            "active"
+        ]
+    );
+    for row in &rows[1..] {
+        let filled = row[10..19].iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
+        // The solver of this test makes gaits without contact forces, from which nothing more can be computed.
+        assert_eq!(filled, if row[6].is_empty() { 0 } else { 3 }, "{row:?}");
+    }
 
     let page = service.fetch(&format!("/studies/{atlas}/atlas?x=a5&y=a6")).await.text;
     for part in
@@ -193,6 +212,28 @@ async fn atlas_is_made_and_shown_through_rest_and_pages() {
     }
     let wrong = service.fetch(&format!("/studies/{atlas}/atlas?x=a5&y=a5")).await;
     assert_eq!(wrong.status, 422, "{}", wrong.text);
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn form_of_a_new_study_offers_gaits_from_an_atlas() {
+    let folder = tempfile::tempdir().unwrap();
+    let service = Service::start(&folder.path().join("a.db"), solver(), 1).await;
+    let subject = service.subject().await;
+    let form = |more: &str| {
+        let rest = "muscles=on&answer_source=gait_rmse&parallel_trials=1&number_of_trials=1&seed=1&tuned_a5=on";
+        format!("subject={subject}&{rest}&{more}")
+    };
+    let refused = service.post_text("/studies/new", FORM, &form("use_atlas=on&repeat_results=on")).await;
+    assert_eq!(refused.status, 422, "{}", refused.text);
+    assert!(refused.text.contains("\u{201c}Repeat known results\u{201d} must be false"), "{}", refused.text);
+    let made = service.post_text("/studies/new", FORM, &form("use_atlas=on")).await;
+    assert_eq!(made.status, 303, "{}", made.text);
+    let study: StudyId = made.headers["location"].to_str().unwrap().rsplit('/').next().unwrap().parse().unwrap();
+    let plan = service.get(study).await.plan;
+    assert_eq!((plan.atlas, plan.warm_start_from), (AtlasRole::Use, WarmStartFrom::Root));
+    let clone = service.fetch(&format!("/studies/new?like={study}")).await.text;
+    assert!(clone.contains("name=\"use_atlas\" value=\"on\" checked"), "{clone}");
     service.stop().await;
 }
 

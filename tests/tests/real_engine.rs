@@ -7,13 +7,13 @@ use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, ReferenceGait, SolveOptions, Subject, TunedBounds,
 };
 use gaitwright_service::access::Reach;
-use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
+use gaitwright_service::studies::{atlas, built_in_entries};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
 use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Evaluate, GaitSolver};
-use gaitwright_store::studies::{AnswerSource, StudyFilter, StudyState};
+use gaitwright_store::studies::{AnswerSource, AtlasRole, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialState;
-use gaitwright_store::{Store, StudyId, TrialId, commit, studies, subjects, trials};
+use gaitwright_store::{Store, StudyId, TrialId, attempts, commit, studies, subjects, trials};
 use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::cli;
 use gaitwright_tests::service::Service;
@@ -452,6 +452,99 @@ fn killed_atlas_continues_and_does_not_depend_on_the_number_of_workers() {
     let text = String::from_utf8_lossy(&refused.stderr);
     assert!(text.contains("atlas of another problem or version"), "{text}");
     assert_eq!(refused.status.code(), Some(2));
+}
+
+/// The trials of each study of a database, with the workers that solved them.
+async fn workers_by_role(database: &Path) -> Vec<(AtlasRole, Vec<String>)> {
+    let pool = gaitwright_store::read_only::open(database).await.unwrap();
+    let mut reader = pool.acquire().await.unwrap();
+    let mut found = Vec::new();
+    for study in studies::page(&mut reader, Reach::Every, &StudyFilter::newest(10)).await.unwrap() {
+        let mut workers = Vec::new();
+        for trial in trials::of_study(&mut reader, study.id).await.unwrap() {
+            let ended = attempts::of_trial(&mut reader, trial.id).await.unwrap();
+            workers.extend(ended.into_iter().map(|attempt| attempt.worker));
+        }
+        found.push((study.plan.atlas, workers));
+    }
+    drop(reader);
+    pool.close().await;
+    found
+}
+
+/// A killed `tune --atlas` keeps its solves, and the same command continues them.
+#[cfg(unix)]
+#[tokio::test]
+async fn killed_tune_continues_its_atlas() {
+    let folder = tempfile::tempdir().unwrap();
+    let (folder, database) = (folder.path(), folder.path().join("gaitwright.db"));
+    std::fs::write(folder.join("coarse.json"), r#"{"mesh": {"ds2": 2, "ds3": 2, "ss2": 3, "ss1": 3}}"#).unwrap();
+    let tune = ["tune", "--atlas", "--muscles", "off", "--settings", "coarse.json", "--trials", "5", "--json"];
+    let _ = study_in(&database, |new| new.answer_source = AnswerSource::People).await;
+    let solves = async || {
+        let studies = workers_by_role(&database).await;
+        assert!(studies.iter().filter(|(role, _)| *role == AtlasRole::Make).count() <= 1, "{studies:?}");
+        studies.into_iter().find(|(role, _)| *role == AtlasRole::Make).map_or(0, |(_, workers)| workers.len())
+    };
+    let start = || {
+        let mut command = cli::command(BINARY, folder, &tune);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let mut killed = start();
+    until("solves of the atlas", async || solves().await > 3).await;
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let kept = solves().await;
+    let continued = start();
+    until("more solves of the atlas", async || solves().await > kept + 3).await;
+    let signalled = std::process::Command::new("kill").args(["-INT", &continued.id().to_string()]).status().unwrap();
+    assert!(signalled.success());
+    let output = continued.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("continuing study") && text.contains("of 11664 actions have a result"), "{text}");
+
+    let service = Service::start(&database, Analytic::default(), 1).await;
+    let listed = service.fetch("/api/v1/studies").await.json();
+    let atlas = listed["items"].as_array().unwrap().iter().find(|study| study["atlas"] == "make").unwrap();
+    let table = service.fetch(&format!("/api/v1/studies/{}/atlas.csv", atlas["id"].as_str().unwrap())).await.text;
+    service.stop().await;
+    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let values = column("objective")..column("active");
+    assert_eq!(values.len(), 9);
+    let rows: Vec<_> = rows.filter(|row| !row[column("gait")].is_empty()).collect();
+    assert!(!rows.is_empty());
+    assert!(rows.iter().all(|row| row[values.clone()].iter().all(|cell| cell.parse::<f64>().is_ok())), "{table}");
+}
+
+/// If the record has the atlas of its problem, `tune --atlas` solves nothing.
+#[tokio::test(flavor = "multi_thread")]
+async fn tune_takes_its_gaits_from_an_atlas_in_the_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = folder.path().join("gaitwright.db");
+    let _ = study_in(&database, |new| new.answer_source = AnswerSource::People).await;
+    let solver = Analytic { states_unchanged_bounds: true, ..Analytic::default() };
+    let service = Service::start(&database, solver, 2).await;
+    let made = service.study(|new| {
+        new.muscles = false;
+        *new = atlas::atlas_of(new.clone());
+    });
+    let made = made.await;
+    service.wait_for(made, &[StudyState::Finished]).await;
+    service.stop().await;
+    // The gaits of this solver fail certification, which the exit code says.
+    let tune = ["tune", "--atlas", "--muscles", "off", "--trials", "5", "--json"];
+    let output = cli::run(BINARY, folder.path(), &tune);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.contains(&format!("taking gaits from the atlas of study {made}")), "{text}");
+    let summary = json_of(&output);
+    assert_eq!((&summary["state"], summary["trials"].as_array().unwrap().len()), (&json!("finished"), 5));
+    for (role, workers) in workers_by_role(&database).await {
+        let solved = workers.iter().any(|worker| worker != "earlier solve");
+        assert_eq!(solved, role == AtlasRole::Make, "{role:?}: {workers:?}");
+    }
 }
 
 /// A real result with muscles, with many more iterations than solves take, beside the 1 MiB that a NATS broker takes in

@@ -2,53 +2,22 @@
 
 use super::solve::status_word;
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
-use gaitwright_service::studies::atlas::GaitMap;
+use gaitwright_service::studies::atlas::{GaitMap, GaitValues};
 
-/// The columns after the action. Scripts rely on them. `gait` numbers the gaits from 1, the root; actions with the same
-/// number have the same gait. `iterations` are those of the solve that found it. `active` lists the bounds that could not
-/// move without changing the gait.
-const COLUMNS: [&str; 13] = [
-    "gait",
-    "status",
-    "iterations",
-    "objective",
-    "cost_of_transport",
-    "gait_rmse_rad",
-    "gait_rmse_other_rad",
-    "speed_m_s",
-    "stride_length_m",
-    "double_support_percent",
-    "step_time_asymmetry",
-    "peak_hip_torque_nm_kg",
-    "active",
-];
+/// The columns after the action, without those of the gait. Scripts rely on them. `gait` numbers the gaits from 1, the root;
+/// actions with the same number have the same gait. `iterations` are those of the solve that found it.
+const COLUMNS: [&str; 3] = ["gait", "status", "iterations"];
 
 pub(super) fn text(atlas: &GaitMap) -> String {
     let mut table = CsvTable::default();
-    table.row(atlas.bounds().chain(COLUMNS).map(CsvCell::from));
+    let columns = COLUMNS.into_iter().chain(GaitValues::COLUMNS).chain(["active"]);
+    table.row(atlas.bounds().chain(columns).map(CsvCell::from));
     for row in atlas.rows() {
         let mut cells: Vec<CsvCell> = row.values.iter().map(CsvCell::from).collect();
         cells.extend(cells![row.number, status_word(row.solved.status), row.solved.iterations]);
-        match &row.solved.gait {
-            Some(gait) => {
-                let active =
-                    gait.unchanged_bounds.iter().filter(|bound| bound.least.is_some() && bound.least == bound.most);
-                let active: Vec<&str> = active.map(|bound| bound.bound.as_str()).collect();
-                cells.extend(cells![
-                    gait.objective,
-                    gait.cost_of_transport,
-                    gait.gait_rmse_rad,
-                    gait.gait_rmse_other_rad,
-                    gait.speed_m_s,
-                    gait.stride_length_m,
-                    gait.double_support_percent,
-                    gait.step_time_asymmetry,
-                    gait.peak_hip_torque_nm_kg,
-                    active.join(" "),
-                ]);
-            }
-            None => cells.extend(COLUMNS.iter().skip(3).map(|_| CsvCell::from(""))),
-        }
+        let gait = row.solved.gait.as_ref();
+        cells.extend(gait.map_or([None; GaitValues::COLUMNS.len()], GaitValues::numbers).map(CsvCell::from));
+        cells.push(CsvCell::from(gait.map_or_else(String::new, |gait| gait.active_bounds().join(" "))));
         table.row(cells);
     }
     table.into_text()

@@ -12,9 +12,11 @@ use axum::response::Response;
 use gaitwright_charts::csv_table::{CsvCell, CsvTable, cells};
 use gaitwright_compute::OnPool;
 use gaitwright_service::access::Read;
-use gaitwright_service::studies::atlas::StudyAtlas;
+use gaitwright_service::error::Error;
+use gaitwright_service::studies::atlas::{AtlasResult, GaitValues, StudyAtlas};
 use gaitwright_store::studies::StudyPlan;
-use gaitwright_store::{StudyId, certificates, studies, trials};
+use gaitwright_store::{StudyId, TrialId, certificates, gaits, reference_gaits, studies, trials};
+use std::collections::HashMap;
 
 /// Get the atlas of a study
 ///
@@ -57,7 +59,26 @@ pub(super) async fn get_csv(
     Visible(id, _): Visible<StudyId, Read>,
 ) -> Result<Response, Refusal> {
     let (plan, atlas) = read(&mut app, id).await?;
-    csv_response(&mut app, &format!("atlas-{}.csv", id.short()), move || table(&plan, &atlas)).await
+    let mut reader = app.read().await?;
+    let reference = reference_gaits::get(&mut reader, plan.reference_gait_id).await?.definition;
+    let mut found = Vec::new();
+    for AtlasResult { trial, .. } in atlas.by_gait_rmse() {
+        if let (Some(report), Some(gait)) = (&trial.report, gaits::find(&mut reader, trial.id).await?) {
+            found.push((trial.id, report.clone(), gait));
+        }
+    }
+    drop(reader);
+    let values = move |pool: &OnPool| {
+        let mut values = HashMap::new();
+        for (trial, report, gait) in found {
+            if let Ok(gait) = GaitValues::of(&report, &gait.unpack(pool)?, &reference) {
+                values.insert(trial, gait);
+            }
+        }
+        Ok::<_, Error>(values)
+    };
+    let values = app.compute(values).await??;
+    csv_response(&mut app, &format!("atlas-{}.csv", id.short()), move || table(&plan, &atlas, &values)).await
 }
 
 async fn read(app: &mut AppState, id: StudyId) -> Result<(StudyPlan, StudyAtlas), Refusal> {
@@ -72,27 +93,27 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<(StudyPlan, StudyAtlas)
     Ok(app.compute(follow).await??)
 }
 
-/// The columns after the action. Scripts rely on them. Actions with the same number of a gait have the same gait.
-const COLUMNS: [&str; 8] =
-    ["gait", "trial", "status", "iterations", "objective", "cost_of_transport", "gait_rmse_rad", "active"];
+/// The columns after the action, without those of the gait. Scripts rely on them. Actions with the same number of a gait have
+/// the same gait.
+const COLUMNS: [&str; 4] = ["gait", "trial", "status", "iterations"];
 
-fn table(plan: &StudyPlan, atlas: &StudyAtlas) -> CsvTable {
+/// The table. Of a gait that the record no longer has, or that is malformed, it has the results of its solve only.
+fn table(plan: &StudyPlan, atlas: &StudyAtlas, values: &HashMap<TrialId, GaitValues>) -> CsvTable {
     let mut table = CsvTable::default();
     let bounds = plan.search_space.dimensions().iter().map(|dimension| dimension.name.as_str());
-    table.row(bounds.chain(COLUMNS).map(CsvCell::from));
+    let columns = COLUMNS.into_iter().chain(GaitValues::COLUMNS).chain(["active"]);
+    table.row(bounds.chain(columns).map(CsvCell::from));
     for result in atlas.results() {
         let trial = result.trial;
         let mut row: Vec<CsvCell> = plan.search_space.values(result.action).iter().map(CsvCell::from).collect();
-        row.extend(cells![
-            result.gait,
-            trial.number,
-            trial.state.as_str(),
-            trial.iterations,
-            trial.objective.filter(|_| result.gait.is_some()),
-            trial.cost_of_transport,
-            trial.gait_rmse_rad,
-            result.active_bounds().join(" "),
-        ]);
+        row.extend(cells![result.gait, trial.number, trial.state.as_str(), trial.iterations]);
+        let mut numbers = [None; GaitValues::COLUMNS.len()];
+        if result.gait.is_some() {
+            numbers[..3].copy_from_slice(&[trial.objective, trial.cost_of_transport, trial.gait_rmse_rad]);
+            numbers = values.get(&trial.id).map_or(numbers, GaitValues::numbers);
+        }
+        row.extend(numbers.map(CsvCell::from));
+        row.push(CsvCell::from(result.active_bounds().join(" ")));
         table.row(row);
     }
     table

@@ -6,7 +6,7 @@ use crate::bound_entries::BoundField;
 use gait_optimizer::{LocalOptimumChoice, TunedBounds};
 use gaitwright_service::access::Reach;
 use gaitwright_service::error::Error;
-use gaitwright_store::studies::{self, Study, StudyPlan, WarmStartFrom};
+use gaitwright_store::studies::{self, AtlasRole, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, consents};
 use std::collections::BTreeMap;
 
@@ -32,6 +32,7 @@ impl NewStudyFields {
             seed: plan.seed.to_string(),
             repeat_results: ticked(plan.repeat_results),
             warm_start_from_root: ticked(plan.warm_start_from == WarmStartFrom::Root),
+            use_atlas: ticked(plan.atlas == AtlasRole::Use),
             simulated_walks_effect: plan.simulated_walks.effect.as_str().to_owned(),
             number_of_simulated_walks: plan.simulated_walks.number_of_simulated_walks.to_string(),
             gait_rmse_tolerance_rad: plan.simulated_walks.gait_rmse_tolerance_rad.to_string(),

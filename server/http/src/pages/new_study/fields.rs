@@ -51,6 +51,9 @@ pub(crate) struct NewStudyFields {
     /// Present when ticked.
     #[serde(default)]
     pub(super) warm_start_from_root: Option<String>,
+    /// Present when ticked. The solves then start from the root, too.
+    #[serde(default)]
+    pub(super) use_atlas: Option<String>,
     #[serde(rename = "simulated_walks.effect", default = "no_simulated_walks")]
     pub(super) simulated_walks_effect: String,
     #[serde(rename = "simulated_walks.number_of_simulated_walks", default)]
@@ -104,6 +107,7 @@ impl Default for NewStudyFields {
             seed: text("1"),
             repeat_results: None,
             warm_start_from_root: None,
+            use_atlas: None,
             simulated_walks_effect: no_simulated_walks(),
             number_of_simulated_walks: String::new(),
             gait_rmse_tolerance_rad: String::new(),
@@ -144,6 +148,8 @@ impl TypedForm for NewStudyFields {
         ("unchanged_limit", "Stop early after"),
         ("parallel_trials", "Parallel trials"),
         ("seed", "Seed"),
+        ("repeat_results", "Repeat known results"),
+        ("use_atlas", "Take gaits from an atlas"),
         ("simulated_walks.effect", "Simulated walks"),
         ("simulated_walks.number_of_simulated_walks", "Number of simulated walks on each kind of ground"),
         ("simulated_walks.gait_rmse_tolerance_rad", "Gait RMSE tolerance, rad"),
@@ -176,6 +182,7 @@ impl TypedForm for NewStudyFields {
         match last.unwrap_or(refused) {
             "device_id" => "device",
             "reference_gait_id" => "reference_gait",
+            "atlas" => "use_atlas",
             other => other,
         }
         .to_owned()
@@ -202,6 +209,8 @@ impl TypedForm for NewStudyFields {
             "unchanged_limit" => self.unchanged_limit.clear(),
             "parallel_trials" => self.parallel_trials = default.parallel_trials,
             "seed" => self.seed = default.seed,
+            "repeat_results" => self.repeat_results = None,
+            "use_atlas" => self.use_atlas = None,
             "simulated_walks.effect" => self.simulated_walks_effect = default.simulated_walks_effect,
             "simulated_walks.number_of_simulated_walks" => self.number_of_simulated_walks.clear(),
             "simulated_walks.gait_rmse_tolerance_rad" => self.gait_rmse_tolerance_rad.clear(),

@@ -132,7 +132,8 @@ impl NewStudyPage {
             let cold_starts = [nearest_within_percent, initial_guesses, local_optimum];
             ([learner, unchanged_limit, parallel_trials, seed], cold_starts, walks)
         };
-        fields(typed) != fields(&default) || typed.repeat_results.is_some() || typed.warm_start_from_root.is_some()
+        let ticks = [&typed.repeat_results, &typed.warm_start_from_root, &typed.use_atlas];
+        fields(typed) != fields(&default) || ticks.into_iter().any(Option::is_some)
     }
 
     /// Measured solve times, with and without muscles.

@@ -11,7 +11,7 @@ use gaitwright_service::studies::seed;
 use gaitwright_service::studies::simulated_walks_setting::SimulatedWalksSetting;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
 use gaitwright_service::studies::subject::{self, NewSubject};
-use gaitwright_store::studies::{AnswerSource, SimulatedWalksEffect, Study, StudyPlan, WarmStartFrom};
+use gaitwright_store::studies::{AnswerSource, AtlasRole, SimulatedWalksEffect, Study, StudyPlan, WarmStartFrom};
 use gaitwright_store::{Connection, SubjectId, Writer, consents};
 use std::ops::ControlFlow;
 use std::str::FromStr;
@@ -129,10 +129,15 @@ fn study_of(
         parallel_trials: number("parallel_trials", &fields.parallel_trials, "1 to 64")?,
         seed: number("seed", &fields.seed, &format!("0 to {}", seed::MAX_SEED))?,
         repeat_results: Some(fields.repeat_results.is_some()),
-        warm_start_from: if fields.warm_start_from_root.is_some() {
+        warm_start_from: if fields.warm_start_from_root.is_some() || fields.use_atlas.is_some() {
             WarmStartFrom::Root
         } else {
             WarmStartFrom::Incumbent
+        },
+        atlas: match base.atlas {
+            AtlasRole::Make => AtlasRole::Make,
+            _ if fields.use_atlas.is_some() => AtlasRole::Use,
+            AtlasRole::Use | AtlasRole::None => AtlasRole::None,
         },
         simulated_walks: simulated_walks(fields)?,
         restricted: fields.restricted.is_some(),

@@ -2,7 +2,7 @@
 
 use gait_optimizer::reference_comparison::compare_with_references;
 use gait_optimizer::spatiotemporal::Spatiotemporal;
-use gait_optimizer::{Gait, ModelError, ReferenceGait, SolveOutcome, UnchangedBound};
+use gait_optimizer::{Gait, ModelError, ReferenceGait, SolveReport, UnchangedBound};
 use serde::{Deserialize, Serialize};
 
 /// The values of a gait.
@@ -31,8 +31,24 @@ pub struct GaitValues {
 }
 
 impl GaitValues {
-    pub(super) fn of(outcome: &SolveOutcome, reference: &ReferenceGait) -> Result<Self, ModelError> {
-        let (report, gait) = (&outcome.report, &outcome.gait);
+    /// Names of [`Self::numbers`], as columns of a table. Scripts rely on them.
+    pub const COLUMNS: [&'static str; 9] = [
+        "objective",
+        "cost_of_transport",
+        "gait_rmse_rad",
+        "gait_rmse_other_rad",
+        "speed_m_s",
+        "stride_length_m",
+        "double_support_percent",
+        "step_time_asymmetry",
+        "peak_hip_torque_nm_kg",
+    ];
+
+    /// The values of a gait, its report and the reference gait of its problem.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the gait is malformed.
+    pub fn of(report: &SolveReport, gait: &Gait, reference: &ReferenceGait) -> Result<Self, ModelError> {
         let compared = compare_with_references(gait, reference)?;
         let others = compared.iter().filter(|comparison| !comparison.of_the_problem);
         let spatiotemporal = Spatiotemporal::of(gait)?;
@@ -50,6 +66,32 @@ impl GaitValues {
             unchanged_bounds: report.unchanged_bounds.clone(),
         })
     }
+
+    /// The numbers, in the order of [`Self::COLUMNS`].
+    pub fn numbers(&self) -> [Option<f64>; 9] {
+        [
+            Some(self.objective),
+            Some(self.cost_of_transport),
+            Some(self.gait_rmse_rad),
+            self.gait_rmse_other_rad,
+            Some(self.speed_m_s),
+            Some(self.stride_length_m),
+            Some(self.double_support_percent),
+            Some(self.step_time_asymmetry),
+            Some(self.peak_hip_torque_nm_kg),
+        ]
+    }
+
+    /// The bounds that cannot move without changing the gait.
+    pub fn active_bounds(&self) -> Vec<&str> {
+        active_bounds(&self.unchanged_bounds)
+    }
+}
+
+/// The bounds that cannot move without changing the gait.
+pub(super) fn active_bounds(unchanged: &[UnchangedBound]) -> Vec<&str> {
+    let active = unchanged.iter().filter(|bound| bound.least.is_some() && bound.least == bound.most);
+    active.map(|bound| bound.bound.as_str()).collect()
 }
 
 /// Largest torque of either hip at the nodes, N m.

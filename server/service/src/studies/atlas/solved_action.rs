@@ -23,7 +23,7 @@ impl SolvedAction {
     pub(crate) fn of(action: ActionIndex, outcome: &SolveOutcome, reference: &ReferenceGait) -> Result<Self, Error> {
         let report = &outcome.report;
         let gait = match report.status {
-            SolveStatus::Converged => Some(GaitValues::of(outcome, reference)?),
+            SolveStatus::Converged => Some(GaitValues::of(report, &outcome.gait, reference)?),
             _ => None,
         };
         Ok(Self { action, status: report.status, iterations: report.iterations, gait })

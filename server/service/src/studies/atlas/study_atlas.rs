@@ -1,5 +1,6 @@
 //! The results of the study of an atlas: the trial that has the gait of each action.
 
+use super::gait_values::active_bounds;
 use super::of_study::replayed;
 use super::progress::AtlasProgress;
 use crate::error::Error;
@@ -35,10 +36,8 @@ pub struct AtlasResult<'a> {
 impl AtlasResult<'_> {
     /// The bounds that cannot move without changing the gait.
     pub fn active_bounds(&self) -> Vec<&str> {
-        let bounds =
-            self.trial.report.iter().filter(|_| self.gait.is_some()).flat_map(|report| &report.unchanged_bounds);
-        let active = bounds.filter(|bound| bound.least.is_some() && bound.least == bound.most);
-        active.map(|bound| bound.bound.as_str()).collect()
+        let report = self.trial.report.as_ref().filter(|_| self.gait.is_some());
+        report.map_or_else(Vec::new, |report| active_bounds(&report.unchanged_bounds))
     }
 }
 
