@@ -7,8 +7,8 @@ use gait_optimizer::{
     CancelToken, Device, GaitProblem, GaitSettings, ReferenceGait, SolveOptions, Subject, TunedBounds,
 };
 use gaitwright_service::access::Reach;
+use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::study_plan::{self, NewStudy};
-use gaitwright_service::studies::{atlas, built_in_entries};
 use gaitwright_service::workers::nats::{ResultMessage, SolveOrder, pack};
 use gaitwright_service::workers::{Assignment, AssignmentResult, Attempt, Evaluate, GaitSolver};
 use gaitwright_store::studies::{AnswerSource, AtlasRole, StudyFilter, StudyState};
@@ -517,34 +517,6 @@ async fn killed_tune_continues_its_atlas() {
     let rows: Vec<_> = rows.filter(|row| !row[column("gait")].is_empty()).collect();
     assert!(!rows.is_empty());
     assert!(rows.iter().all(|row| row[values.clone()].iter().all(|cell| cell.parse::<f64>().is_ok())), "{table}");
-}
-
-/// If the record has the atlas of its problem, `tune --atlas` solves nothing.
-#[tokio::test(flavor = "multi_thread")]
-async fn tune_takes_its_gaits_from_an_atlas_in_the_record() {
-    let folder = tempfile::tempdir().unwrap();
-    let database = folder.path().join("gaitwright.db");
-    let _ = study_in(&database, |new| new.answer_source = AnswerSource::People).await;
-    let solver = Analytic { states_unchanged_bounds: true, ..Analytic::default() };
-    let service = Service::start(&database, solver, 2).await;
-    let made = service.study(|new| {
-        new.muscles = false;
-        *new = atlas::atlas_of(new.clone());
-    });
-    let made = made.await;
-    service.wait_for(made, &[StudyState::Finished]).await;
-    service.stop().await;
-    // The gaits of this solver fail certification, which the exit code says.
-    let tune = ["tune", "--atlas", "--muscles", "off", "--trials", "5", "--json"];
-    let output = cli::run(BINARY, folder.path(), &tune);
-    let text = String::from_utf8_lossy(&output.stderr);
-    assert!(text.contains(&format!("taking gaits from the atlas of study {made}")), "{text}");
-    let summary = json_of(&output);
-    assert_eq!((&summary["state"], summary["trials"].as_array().unwrap().len()), (&json!("finished"), 5));
-    for (role, workers) in workers_by_role(&database).await {
-        let solved = workers.iter().any(|worker| worker != "earlier solve");
-        assert_eq!(solved, role == AtlasRole::Make, "{role:?}: {workers:?}");
-    }
 }
 
 /// A real result with muscles, with many more iterations than solves take, beside the 1 MiB that a NATS broker takes in
