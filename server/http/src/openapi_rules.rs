@@ -4,6 +4,7 @@
 //! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
 //! of their own checks.
 
+use super::figures::MAX_IN_A_CHART;
 use super::openapi_dependent_rules;
 use super::openapi_descriptions;
 use super::openapi_schemas::{Schemas, merge};
@@ -177,12 +178,12 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
     }
     let mut unused: Vec<&str> = PARAMETERS.to_vec();
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
-        for (_, item) in paths {
+        for (path, item) in paths {
             let operations = item.as_object_mut().into_iter().flatten();
             for parameter in
                 operations.filter_map(|(_, operation)| operation.get_mut("parameters")?.as_array_mut()).flatten()
             {
-                state_parameter(parameter);
+                state_parameter(path, parameter);
                 unused.retain(|name| parameter["name"] != *name);
             }
         }
@@ -354,7 +355,7 @@ fn widen(schema: &mut Value, other: &Value) {
     }
 }
 
-fn state_parameter(parameter: &mut Value) {
+fn state_parameter(path: &str, parameter: &mut Value) {
     // A header or query parameter is present or absent, but never null.
     if let Some(kind) = parameter.pointer_mut("/schema/type")
         && let Value::Array(kinds) = kind
@@ -372,8 +373,8 @@ fn state_parameter(parameter: &mut Value) {
         }
         "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => identifiers(2, 20),
-        // A study is compared with one other study, whose identifier is a schema.
-        "other" if parameter["schema"].get("$ref").is_none() => identifiers(1, MAX_OTHERS),
+        "other" if path.contains("/studies/") => identifiers(1, MAX_IN_A_CHART - 1),
+        "other" => identifiers(1, MAX_OTHERS),
         "x" | "y" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };

@@ -17,5 +17,5 @@ mod utility;
 
 pub(crate) use outcome::StudyOutcome;
 pub(crate) use study_progress::{COURSE, course, warm_starts};
-pub(crate) use study_results::{StudyResults, have_one_reference_gait};
+pub(crate) use study_results::{MAX_IN_A_CHART, StudyResults, have_one_reference_gait};
 pub(crate) use utility::utility;
