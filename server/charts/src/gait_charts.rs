@@ -15,7 +15,10 @@ mod solve_charts;
 
 pub use drawn_gait::drawn;
 pub use group::Group;
-pub use joint_angles::{measured_beside_reference, of_reference, of_reference_in_one_chart, with_reference};
+pub use joint_angles::{
+    MeasuredAngle, measured_beside_gaits, measured_beside_reference, of_reference, of_reference_in_one_chart,
+    with_reference,
+};
 pub use limit_cycles::{limit_cycle, limit_cycles};
 pub use reference_curve::band_in_words;
 pub use solve_charts::solve;
