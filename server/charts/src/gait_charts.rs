@@ -3,6 +3,7 @@
 mod drawn_gait;
 mod ground_forces;
 mod group;
+mod joint_accelerations;
 mod joint_angles;
 mod joint_torques;
 mod leg_cycle;
@@ -60,8 +61,10 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
     groups.extend(joint_torques::torques_and_powers(&cycle, mass_kg));
     if gait.muscles {
         groups.push(muscle_states::activations(&cycle));
+        groups.push(muscle_states::forces(&cycle, gait));
         groups.push(muscle_states::fibre_lengths(&cycle));
     }
+    groups.push(joint_accelerations::accelerations(&cycle));
     groups.push(progress_of(&cycle, gait)?);
     groups.push(limit_cycles::limit_cycle_group(&cycle));
     Ok(groups)
