@@ -49,7 +49,7 @@ async fn browsers_get_error_pages_and_programs_problem_documents() {
         ("/trials/abc".to_owned(), StatusCode::NOT_FOUND),
         (format!("/studies/{UNKNOWN}"), StatusCode::NOT_FOUND),
         (format!("/studies/{study}/compare?a=zz"), StatusCode::UNPROCESSABLE_ENTITY),
-        ("/?before=zz".to_owned(), StatusCode::UNPROCESSABLE_ENTITY),
+        ("/?after=zz".to_owned(), StatusCode::UNPROCESSABLE_ENTITY),
         (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
         ("/nothing".to_owned(), StatusCode::NOT_FOUND),
     ] {
@@ -508,10 +508,43 @@ async fn study_list_has_further_pages() {
     }
     let first = service.fetch("/").await.text;
     assert!(first.contains("number 102.") && first.contains("number 3.") && !first.contains("number 2."));
-    let next = first.split("href=\"/?before=").nth(1).unwrap().split('"').next().unwrap();
-    let second = service.fetch(&format!("/?before={next}")).await.text;
+    let next = first.split("href=\"/?after=").nth(1).unwrap().split('"').next().unwrap();
+    let second = service.fetch(&format!("/?after={next}")).await.text;
     assert!(second.contains("number 2.") && second.contains("number 0.") && !second.contains("number 3."));
     assert!(second.contains("Newest studies") && !second.contains("Older studies"));
+    // Sorted by a column, the second page continues where the first one ends.
+    let shown = async |path: &str| service.fetch(path).await.text.replace("&#38;", "&").replace("&amp;", "&");
+    let newest = shown("/").await;
+    let head = "aria-sort=\"descending\"><a href=\"/?sort=created_at&order=ascending\">Created";
+    assert!(newest.contains(head), "{newest}");
+    let first = shown("/?sort=name&order=ascending").await;
+    let names = |page: &str| -> Vec<String> {
+        let table = page.split("class=\"studies\"").nth(1).unwrap();
+        table
+            .split("number ")
+            .skip(1)
+            .map(|rest| rest.split('.').next().unwrap().to_owned())
+            .filter(|n| n.len() < 4)
+            .collect()
+    };
+    let next = first.split("rel=\"next\"").next().unwrap().rsplit("href=\"").next().unwrap().split('"').next().unwrap();
+    let second = shown(next).await;
+    let mut sorted: Vec<String> = (0..103).map(|number: u32| number.to_string()).collect();
+    sorted.sort_by_key(|number| format!("{number}."));
+    let mut found = names(&first);
+    found.extend(names(&second));
+    found.dedup();
+    assert_eq!(found, sorted);
+    let by_name = service.fetch("/api/v1/studies?sort=-name&limit=2").await;
+    let both =
+        |page: &serde_json::Value| page.as_array().unwrap().iter().map(|s| s["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(both(&by_name.items()), ["number 99.", "number 98."]);
+    let cursor = by_name.json()["next"].as_str().unwrap().to_owned();
+    let after = service.fetch(&format!("/api/v1/studies?sort=-name&limit=2&cursor={cursor}")).await;
+    assert_eq!(both(&after.items()), ["number 97.", "number 96."]);
+    for path in ["/?sort=seed", "/api/v1/studies?sort=seed"] {
+        assert_eq!(service.fetch(path).await.status, StatusCode::UNPROCESSABLE_ENTITY, "{path}");
+    }
     service.stop().await;
 }
 

@@ -21,7 +21,8 @@ use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::overlaid_gaits::MAX_OTHERS;
 use gaitwright_service::studies::seed::MAX_SEED;
-use gaitwright_store::trial_list::SORTS;
+use gaitwright_store::studies::StudyColumn;
+use gaitwright_store::trial_list::{RANGES, SORTS};
 use serde_json::{Map, Value, json};
 
 /// Control characters other than tab and line breaks, and characters that change the direction of text.
@@ -46,7 +47,8 @@ const NAMES: [(&str, &str, u32); 13] = [
 ];
 
 /// Parameters with rules.
-const PARAMETERS: [&str; 10] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "other", "x", "y"];
+const PARAMETERS: [&str; 11] =
+    ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "range", "code", "ids", "other", "x", "y"];
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
@@ -368,9 +370,12 @@ fn state_parameter(path: &str, parameter: &mut Value) {
         "walk" => json!({ "minimum": 2, "maximum": 3 }),
         "after" | "Last-Event-ID" => json!({ "minimum": 0 }),
         "sort" => {
-            let names: Vec<String> = SORTS.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
+            let studies = StudyColumn::ALL.map(StudyColumn::as_str);
+            let columns = if path.ends_with("/studies") { &studies[..] } else { &SORTS[..] };
+            let names: Vec<String> = columns.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
             json!({ "enum": names })
         }
+        "range" => json!({ "enum": RANGES }),
         "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => identifiers(2, 20),
         "other" if path.contains("/studies/") => identifiers(1, MAX_IN_A_CHART - 1),
