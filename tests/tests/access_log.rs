@@ -241,7 +241,7 @@ async fn every_spelling_of_an_identifier_every_refused_form_and_every_second_sub
         (format!("/api/v1/studies/{upper}"), 1),
         (format!("/api/v1/studies/{simple}"), 1),
         (format!("/api/v1/studies/%7B{first}%7D/trials.csv"), 1),
-        (format!("/studies/compare?pad={padding}&a={first}&b={second}"), 2),
+        (format!("/studies/compare?pad={padding}&study={first}&study={second}"), 2),
         (format!("/api/v1/study-comparison?ids={encoded}"), 2),
     ];
     for (path, subjects) in &pages {

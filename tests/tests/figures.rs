@@ -60,11 +60,11 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     for (page, least) in [
         (format!("/studies/{}", studies[0]), 1 + 1),
         (format!("/studies/{}/compare?a={}&b={}", studies[0], gaits[0].id, gaits[1].id), 7),
-        (format!("/studies/compare?a={}&b={}", studies[0], studies[1]), 1),
+        (format!("/studies/compare?study={}&study={}", studies[0], studies[1]), 1),
         (format!("/studies/{}/figures?other={}", studies[0], studies[1]), 1 + 7 + 2 + 7),
-        (format!("/trials/{}", gaits[0].id), 1 + 1 + 4 + 2 + 3 + 3 + 7 + 7 + 2 + 4 + 1),
+        (format!("/trials/{}", gaits[0].id), 1 + 1 + 4 + 2 + 3 + 3 + 7 + 7 + 7 + 3 + 2 + 4 + 1),
         (format!("/lab-sessions/{session}"), 6 + 2),
-        (format!("/studies/{}/analysis?x=a5&y=a6", studies[0]), 8 + 2 + 2 + 1),
+        (format!("/studies/{}/analysis?x=a5&y=a6", studies[0]), 8 + 1 + 2 + 2 + 1),
         (format!("/reference-gaits/{}", service.reference().await), 4),
     ] {
         let shown = service.fetch(&page).await;

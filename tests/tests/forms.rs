@@ -49,7 +49,7 @@ async fn browsers_get_error_pages_and_programs_problem_documents() {
         ("/trials/abc".to_owned(), StatusCode::NOT_FOUND),
         (format!("/studies/{UNKNOWN}"), StatusCode::NOT_FOUND),
         (format!("/studies/{study}/compare?a=zz"), StatusCode::UNPROCESSABLE_ENTITY),
-        ("/?before=zz".to_owned(), StatusCode::UNPROCESSABLE_ENTITY),
+        ("/?after=zz".to_owned(), StatusCode::UNPROCESSABLE_ENTITY),
         (format!("/studies/{study}/do"), StatusCode::METHOD_NOT_ALLOWED),
         ("/nothing".to_owned(), StatusCode::NOT_FOUND),
     ] {
@@ -508,10 +508,43 @@ async fn study_list_has_further_pages() {
     }
     let first = service.fetch("/").await.text;
     assert!(first.contains("number 102.") && first.contains("number 3.") && !first.contains("number 2."));
-    let next = first.split("href=\"/?before=").nth(1).unwrap().split('"').next().unwrap();
-    let second = service.fetch(&format!("/?before={next}")).await.text;
+    let next = first.split("href=\"/?after=").nth(1).unwrap().split('"').next().unwrap();
+    let second = service.fetch(&format!("/?after={next}")).await.text;
     assert!(second.contains("number 2.") && second.contains("number 0.") && !second.contains("number 3."));
     assert!(second.contains("Newest studies") && !second.contains("Older studies"));
+    // Sorted by a column, the second page continues where the first one ends.
+    let shown = async |path: &str| service.fetch(path).await.text.replace("&#38;", "&").replace("&amp;", "&");
+    let newest = shown("/").await;
+    let head = "aria-sort=\"descending\"><a href=\"/?sort=created_at&order=ascending\">Created";
+    assert!(newest.contains(head), "{newest}");
+    let first = shown("/?sort=name&order=ascending").await;
+    let names = |page: &str| -> Vec<String> {
+        let table = page.split("class=\"studies\"").nth(1).unwrap();
+        table
+            .split("number ")
+            .skip(1)
+            .map(|rest| rest.split('.').next().unwrap().to_owned())
+            .filter(|n| n.len() < 4)
+            .collect()
+    };
+    let next = first.split("rel=\"next\"").next().unwrap().rsplit("href=\"").next().unwrap().split('"').next().unwrap();
+    let second = shown(next).await;
+    let mut sorted: Vec<String> = (0..103).map(|number: u32| number.to_string()).collect();
+    sorted.sort_by_key(|number| format!("{number}."));
+    let mut found = names(&first);
+    found.extend(names(&second));
+    found.dedup();
+    assert_eq!(found, sorted);
+    let by_name = service.fetch("/api/v1/studies?sort=-name&limit=2").await;
+    let both =
+        |page: &serde_json::Value| page.as_array().unwrap().iter().map(|s| s["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(both(&by_name.items()), ["number 99.", "number 98."]);
+    let cursor = by_name.json()["next"].as_str().unwrap().to_owned();
+    let after = service.fetch(&format!("/api/v1/studies?sort=-name&limit=2&cursor={cursor}")).await;
+    assert_eq!(both(&after.items()), ["number 97.", "number 96."]);
+    for path in ["/?sort=seed", "/api/v1/studies?sort=seed"] {
+        assert_eq!(service.fetch(path).await.status, StatusCode::UNPROCESSABLE_ENTITY, "{path}");
+    }
     service.stop().await;
 }
 
@@ -626,7 +659,7 @@ async fn comparison_of_studies_with_answers_of_people_leads_with_these_answers()
     for (study, state) in [(people, StudyState::Waiting), (other, StudyState::Finished)] {
         service.wait_for(study, &[state]).await;
     }
-    let path = format!("/studies/compare?a={people}&b={other}");
+    let path = format!("/studies/compare?study={people}&study={other}");
     let before = service.fetch(&path).await.text;
     assert!(before.contains("no gait is recommended yet") && before.contains("Gait RMSE answers every comparison"));
     let trials = service.trials(people).await;
@@ -640,8 +673,44 @@ async fn comparison_of_studies_with_answers_of_people_leads_with_these_answers()
     let place = |text: &str| after.find(text).unwrap_or_else(|| panic!("{text}: {after}"));
     assert!(place("about this gait") < place(": utility of the recommended gait</h3>"));
     assert!(place(": utility of the recommended gait</h3>") < place("Gait RMSE of the best action by iteration</h3>"));
-    let same = service.fetch(&format!("/studies/compare?a={people}&b={people}")).await;
-    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Study B\u{201d} is the same study as study A.");
+    service.stop().await;
+}
+
+#[tokio::test]
+async fn several_studies_are_compared_in_one_chart_and_one_table() {
+    let (_folder, service) = service().await;
+    let mut studies = Vec::new();
+    for number in 1..=7 {
+        let study = service.study(|new| (new.number_of_trials, new.seed) = (2, number)).await;
+        service.wait_for(study, &[StudyState::Finished]).await;
+        studies.push(study);
+    }
+    let address = |studies: &[StudyId]| {
+        let chosen: Vec<String> = studies.iter().map(|study| format!("study={study}")).collect();
+        format!("/studies/compare?{}", chosen.join("&"))
+    };
+    // A study that is named twice counts once.
+    let page = service.fetch(&address(&[studies[0], studies[1], studies[2], studies[0]])).await.text;
+    let head = page.split("class=\"sides\"").nth(1).unwrap().split("</thead>").next().unwrap();
+    assert_eq!(head.matches("<a href=\"/studies/").count(), 3, "{head}");
+    assert!(!page.contains("class=\"gait-walker\""), "three gaits do not walk side by side");
+    // Every recommended gait is in the sentence, the one closest to the reference gait first.
+    let sentence = page.split("Closest to the reference gait: ").nth(1).unwrap().split("</p>").next().unwrap();
+    let rmse = sentence.split("Gait RMSE ").skip(1).map(|rest| rest.split(' ').next().unwrap().parse::<f64>().unwrap());
+    let rmse: Vec<f64> = rmse.collect();
+    assert!(rmse.len() == 3 && rmse.is_sorted(), "{sentence}");
+    let file = page.split("/figures/").nth(1).unwrap().split("\"").next().unwrap().replace(".svg", ".csv");
+    let file = service.fetch(&format!("/api/v1/studies/{}/figures/{file}", studies[0])).await;
+    assert_eq!(file.status, StatusCode::OK, "{}", file.text);
+    for study in &studies[..3] {
+        assert!(file.text.contains(&service.get(*study).await.plan.name), "{}", file.text);
+    }
+    let most = service.fetch(&address(&studies[..6])).await;
+    assert_eq!(most.status, StatusCode::OK, "{}", most.text);
+    let refused = service.fetch(&address(&studies)).await;
+    is_page(&refused, StatusCode::UNPROCESSABLE_ENTITY, "At most 6 studies can be compared; 7 are chosen.");
+    assert_eq!(refused.text.matches("name=\"study\"").count(), 7, "the form is there: {}", refused.text);
+    assert_eq!(refused.text.matches(" checked").count(), 7, "{}", refused.text);
     service.stop().await;
 }
 
@@ -948,9 +1017,6 @@ async fn every_form_reports_all_refused_fields_at_once() {
         }
         assert!(refused.text.contains("aria-invalid=\"true\" aria-describedby=\"refused\" autofocus"), "{path}");
     }
-    let same = service.fetch(&format!("/studies/compare?a={study}&b={study}")).await;
-    is_page(&same, StatusCode::UNPROCESSABLE_ENTITY, "\u{201c}Study B\u{201d} is the same study as study A.");
-    assert!(same.text.contains("<select name=\"b\""), "the form is there: {}", same.text);
     service.stop().await;
 }
 

@@ -46,9 +46,9 @@ async fn gait_rmse_is_not_compared_between_studies_with_different_reference_gait
             assert_eq!(row["best_gait_rmse_rad"].is_number(), comparable, "{row}");
             assert!(row["best_cost_of_transport"].is_number() && row["reference_gait_id"].is_string(), "{row}");
         }
-        let page = service.fetch(&format!("/studies/compare?a={a}&b={b}")).await.text;
+        let page = service.fetch(&format!("/studies/compare?study={a}&study={b}")).await.text;
         assert_eq!(page.contains("Gait RMSE of the recommended trial"), comparable);
-        assert_eq!(page.contains("class=\"sided\""), comparable);
+        assert_eq!(page.contains("Gait RMSE of the best action by iteration</h3>"), comparable);
         assert_eq!(page.contains(warning), !comparable);
         let figures = service.fetch(&format!("/studies/{a}/figures?other={b}")).await.text;
         assert_eq!(figures.contains(warning), !comparable);

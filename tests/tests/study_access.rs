@@ -315,7 +315,7 @@ async fn lists_show_a_restricted_study_to_members_only() {
     let study = closed.study;
     for path in [
         format!("/api/v1/study-comparison?ids={other},{{}}"),
-        format!("/studies/compare?a={other}&b={{}}"),
+        format!("/studies/compare?study={other}&study={{}}"),
         format!("/studies/{other}/figures?other={{}}"),
         format!("/api/v1/studies/{other}/figures/rmse.csv?other={{}}"),
     ] {

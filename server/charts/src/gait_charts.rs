@@ -3,6 +3,7 @@
 mod drawn_gait;
 mod ground_forces;
 mod group;
+mod joint_accelerations;
 mod joint_angles;
 mod joint_torques;
 mod leg_cycle;
@@ -15,7 +16,10 @@ mod solve_charts;
 
 pub use drawn_gait::drawn;
 pub use group::Group;
-pub use joint_angles::{measured_beside_reference, of_reference, of_reference_in_one_chart, with_reference};
+pub use joint_angles::{
+    MeasuredAngle, measured_beside_gaits, measured_beside_reference, of_reference, of_reference_in_one_chart,
+    with_reference,
+};
 pub use limit_cycles::{limit_cycle, limit_cycles};
 pub use reference_curve::band_in_words;
 pub use solve_charts::solve;
@@ -57,8 +61,10 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
     groups.extend(joint_torques::torques_and_powers(&cycle, mass_kg));
     if gait.muscles {
         groups.push(muscle_states::activations(&cycle));
+        groups.push(muscle_states::forces(&cycle, gait));
         groups.push(muscle_states::fibre_lengths(&cycle));
     }
+    groups.push(joint_accelerations::accelerations(&cycle));
     groups.push(progress_of(&cycle, gait)?);
     groups.push(limit_cycles::limit_cycle_group(&cycle));
     Ok(groups)

@@ -30,6 +30,8 @@ pub struct Point<'a> {
     pub q: &'a [f64; 9],
     /// Velocities.
     pub qd: &'a [f64; 9],
+    /// Accelerations.
+    pub qdd: &'a [f64; 9],
     /// Torques, N m.
     pub u: &'a [f64; 6],
     /// Ground forces in the order of [`FORCE_NAMES`], N.
@@ -45,8 +47,9 @@ pub struct Point<'a> {
 pub fn points(gait: &Gait) -> Vec<Point<'_>> {
     let mut points = Vec::new();
     for domain in &gait.domains {
-        let rows = domain.q.iter().zip(&domain.qd).zip(&domain.u).zip(&domain.contact_forces);
-        for (i, (((q, qd), u), given)) in rows.enumerate() {
+        let motion = domain.q.iter().zip(&domain.qd).zip(&domain.qdd);
+        let rows = motion.zip(&domain.u).zip(&domain.contact_forces);
+        for (i, ((((q, qd), qdd), u), given)) in rows.enumerate() {
             let mut forces = [0.0; 8];
             for (name, value) in domain.contact_rows.iter().zip(given) {
                 let side = if name.side == Side::Left { 0 } else { 4 };
@@ -58,7 +61,7 @@ pub fn points(gait: &Gait) -> Vec<Point<'_>> {
             let activation = muscles.and_then(|muscles| muscles.activation.get(i));
             let fibre_length = muscles.and_then(|muscles| muscles.fibre_length.get(i));
             let time_s = domain.time_s.get(i).copied().unwrap_or_default();
-            points.push(Point { time_s, domain: &domain.name, q, qd, u, forces, activation, fibre_length });
+            points.push(Point { time_s, domain: &domain.name, q, qd, qdd, u, forces, activation, fibre_length });
         }
     }
     points

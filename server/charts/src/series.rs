@@ -23,6 +23,12 @@ pub enum Stroke {
     Steps,
     /// A dashed step line with a mark at each point.
     DashedSteps,
+    /// A dotted step line with a mark at each point.
+    DottedSteps,
+    /// A step line of alternating dashes and dots with a mark at each point.
+    DashDottedSteps,
+    /// A step line of long dashes with a mark at each point.
+    LongDashedSteps,
     /// A line with a mark at each point.
     Marked,
 }
@@ -74,13 +80,17 @@ impl Stroke {
     /// Dash patterns that distinguish lines without colours. They repeat after five.
     pub const DISTINCT: [Self; 5] = [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDotted, Self::LongDashed];
 
+    /// The same dash patterns for step lines.
+    pub const DISTINCT_STEPS: [Self; 5] =
+        [Self::Steps, Self::DashedSteps, Self::DottedSteps, Self::DashDottedSteps, Self::LongDashedSteps];
+
     pub(super) fn class(self) -> &'static str {
         match self {
             Self::Solid | Self::Steps | Self::Marked => "solid",
             Self::Dashed | Self::DashedSteps => "dashed",
-            Self::Dotted => "dotted",
-            Self::DashDotted => "dash_dotted",
-            Self::LongDashed => "long_dashed",
+            Self::Dotted | Self::DottedSteps => "dotted",
+            Self::DashDotted | Self::DashDottedSteps => "dash_dotted",
+            Self::LongDashed | Self::LongDashedSteps => "long_dashed",
             Self::Points => "points",
         }
     }
@@ -117,7 +127,7 @@ impl Series {
             let seen = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
             for run in self.points.split(|point| !seen(point)) {
                 let mut places: Vec<(f64, f64)> = run.iter().map(|&(x, y)| (px(x), py(y))).collect();
-                let steps = matches!(self.stroke, Stroke::Steps | Stroke::DashedSteps);
+                let steps = Stroke::DISTINCT_STEPS.contains(&self.stroke);
                 if Stroke::DISTINCT.contains(&self.stroke) {
                     places = simplified(&places);
                 }

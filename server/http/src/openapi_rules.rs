@@ -4,6 +4,7 @@
 //! the same rules everywhere, so they are stated once. The ranges of solver and learner settings come from the errors
 //! of their own checks.
 
+use super::figures::MAX_IN_A_CHART;
 use super::openapi_dependent_rules;
 use super::openapi_descriptions;
 use super::openapi_schemas::{Schemas, merge};
@@ -20,7 +21,8 @@ use gaitwright_service::access::Right;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::overlaid_gaits::MAX_OTHERS;
 use gaitwright_service::studies::seed::MAX_SEED;
-use gaitwright_store::trial_list::SORTS;
+use gaitwright_store::studies::StudyColumn;
+use gaitwright_store::trial_list::{RANGES, SORTS};
 use serde_json::{Map, Value, json};
 
 /// Control characters other than tab and line breaks, and characters that change the direction of text.
@@ -45,7 +47,8 @@ const NAMES: [(&str, &str, u32); 13] = [
 ];
 
 /// Parameters with rules.
-const PARAMETERS: [&str; 10] = ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "code", "ids", "other", "x", "y"];
+const PARAMETERS: [&str; 11] =
+    ["rate_hz", "walk", "after", "Last-Event-ID", "sort", "range", "code", "ids", "other", "x", "y"];
 
 /// Where schemas are in a description.
 pub(super) const SCHEMAS: &str = "#/components/schemas/";
@@ -177,12 +180,12 @@ pub(super) fn state(document: &mut Value) -> Vec<String> {
     }
     let mut unused: Vec<&str> = PARAMETERS.to_vec();
     if let Some(paths) = document.get_mut("paths").and_then(Value::as_object_mut) {
-        for (_, item) in paths {
+        for (path, item) in paths {
             let operations = item.as_object_mut().into_iter().flatten();
             for parameter in
                 operations.filter_map(|(_, operation)| operation.get_mut("parameters")?.as_array_mut()).flatten()
             {
-                state_parameter(parameter);
+                state_parameter(path, parameter);
                 unused.retain(|name| parameter["name"] != *name);
             }
         }
@@ -354,7 +357,7 @@ fn widen(schema: &mut Value, other: &Value) {
     }
 }
 
-fn state_parameter(parameter: &mut Value) {
+fn state_parameter(path: &str, parameter: &mut Value) {
     // A header or query parameter is present or absent, but never null.
     if let Some(kind) = parameter.pointer_mut("/schema/type")
         && let Value::Array(kinds) = kind
@@ -367,13 +370,16 @@ fn state_parameter(parameter: &mut Value) {
         "walk" => json!({ "minimum": 2, "maximum": 3 }),
         "after" | "Last-Event-ID" => json!({ "minimum": 0 }),
         "sort" => {
-            let names: Vec<String> = SORTS.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
+            let studies = StudyColumn::ALL.map(StudyColumn::as_str);
+            let columns = if path.ends_with("/studies") { &studies[..] } else { &SORTS[..] };
+            let names: Vec<String> = columns.iter().flat_map(|name| [(*name).to_owned(), format!("-{name}")]).collect();
             json!({ "enum": names })
         }
+        "range" => json!({ "enum": RANGES }),
         "code" => json!({ "pattern": "^[0-9a-f]{64}$" }),
         "ids" => identifiers(2, 20),
-        // A study is compared with one other study, whose identifier is a schema.
-        "other" if parameter["schema"].get("$ref").is_none() => identifiers(1, MAX_OTHERS),
+        "other" if path.contains("/studies/") => identifiers(1, MAX_IN_A_CHART - 1),
+        "other" => identifiers(1, MAX_OTHERS),
         "x" | "y" => json!({ "enum": TunedBounds::NAMES }),
         _ => return,
     };

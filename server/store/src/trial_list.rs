@@ -20,6 +20,29 @@ pub const SORTS: [&str; COLUMNS.len() + TunedBounds::COUNT] = {
     sorts
 };
 
+/// Columns by whose range trials can be filtered.
+pub const RANGES: [&str; 2 + TunedBounds::COUNT] = {
+    let mut ranges = [""; 2 + TunedBounds::COUNT];
+    (ranges[0], ranges[1]) = ("gait_rmse_rad", "cost_of_transport");
+    let mut at = 0;
+    while at < TunedBounds::COUNT {
+        ranges[at + 2] = TunedBounds::NAMES[at];
+        at += 1;
+    }
+    ranges
+};
+
+/// A range of a value. A trial without the value is outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValueRange {
+    /// One of [`RANGES`].
+    pub column: &'static str,
+    /// Least value.
+    pub from: f64,
+    /// Greatest value.
+    pub to: f64,
+}
+
 /// Filter, order and page of a listing.
 #[derive(Debug, Clone)]
 pub struct Listing {
@@ -31,6 +54,8 @@ pub struct Listing {
     pub state: Option<TrialState>,
     /// Only trials whose reason or message contains this text, ignoring case.
     pub contains: String,
+    /// Only trials with a value in this range.
+    pub range: Option<ValueRange>,
     /// Maximum number of trials.
     pub limit: u32,
     /// Where the page begins.
@@ -115,7 +140,11 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
              when 'seconds_total' then t.seconds_total else json_extract(t.action, '$.' || ?2) end as key \
          from trials t \
          where t.study_id = ?1 and (?4 is null or t.state = ?4) \
-             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0)), \
+             and (?5 = '' or instr(lower(t.reason || ' ' || t.message), lower(?5)) > 0) \
+             and (?10 is null or case ?10 \
+                 when 'gait_rmse_rad' then iif(t.state in ('converged', 'not_executable'), t.gait_rmse_rad, null) \
+                 when 'cost_of_transport' then iif(t.state in ('converged', 'not_executable'), t.cost_of_transport, null) \
+                 else json_extract(t.action, '$.' || ?10) end between ?11 and ?12)), \
          listed as (select *, row_number() over (order by key is null, case when ?3 then key end desc, \
              case when ?3 then null else key end, number desc) - 1 as before from keyed) \
          select * from listed where ?8 is null \
@@ -140,6 +169,8 @@ pub async fn of_study(db: &mut Connection, study: StudyId, listing: &Listing) ->
         Some(SortedValue::Real(value)) => query.bind(*value),
         Some(SortedValue::Text(value)) => query.bind(value),
     };
+    let query = query.bind(listing.range.map(|range| range.column));
+    let query = query.bind(listing.range.map(|range| range.from)).bind(listing.range.map(|range| range.to));
     let mut rows = query.fetch_all(db).await?;
     if is_before {
         rows.reverse();

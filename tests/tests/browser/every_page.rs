@@ -159,7 +159,7 @@ async fn pages(site: &Site) -> Vec<(&'static str, String)> {
         ("study", format!("/studies/{study}")),
         ("analysis", format!("/studies/{study}/analysis?x=a5&y=a6")),
         ("atlas", format!("/studies/{study}/atlas")),
-        ("side-by-side", format!("/studies/compare?a={study}&b={other}")),
+        ("side-by-side", format!("/studies/compare?study={study}&study={other}")),
         ("compare", format!("/studies/{other}/compare")),
         ("gait", format!("/trials/{gait}")),
         ("no-gait", format!("/trials/{no_gait}")),

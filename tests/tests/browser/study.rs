@@ -346,7 +346,10 @@ async fn browser_shows_the_posterior_and_the_warm_start_tree() {
 
     let other = site.service.study(|new| (new.number_of_trials, new.muscles) = (4, false)).await;
     site.service.wait_for(other, &[StudyState::Finished]).await;
-    let page = browser.open(&site.at(&format!("/studies/compare?a={study}&b={other}"))).await;
+    let page = browser.open(&site.at(&format!("/studies/compare?study={study}&study={other}"))).await;
+    page.resize(1280, 800).await;
+    let (bottom, ..) = page.lowest(".headline, .beside svg.chart, .beside svg.gait-walker").await;
+    assert!(bottom <= 800.0, "{bottom}");
     assert_eq!(page.count("svg.chart path.line").await, 2);
     assert!(page.text(".sides").await.contains("without muscles"));
     let page = browser.open(&site.at(&format!("/studies/{study}"))).await;

@@ -64,9 +64,10 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
     visit.ends_at("[data-part=best]", "Gait RMSE", 1).await;
 
     let mut visit = Visit::begin(&browser, &site, "how do two studies compare").await;
-    visit.press(".heading a[href='/studies/compare']").await;
-    visit.press("form.filter button").await;
-    visit.ends_at("main h2", "The recommended gaits", 2).await;
+    visit.press(&format!("table.studies input[value='{finished}']")).await;
+    visit.press(&format!("table.studies input[value='{other}']")).await;
+    visit.press(".heading button[form=compare]").await;
+    visit.ends_at(".headline", "Closest to the reference gait: ", 3).await;
 
     let trials = site.service.trials(finished).await;
     let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
@@ -82,8 +83,10 @@ async fn browser_reaches_outcome_progress_comparison_and_lab_results_in_few_pres
     site.service.post(&format!("{session}/emg-results"), &json!({})).await;
     let mut visit = Visit::begin(&browser, &site, "what was the muscle activity of a visit").await;
     visit.press(&link(finished)).await;
-    visit.press("#lab a[href^='/lab-sessions/']").await;
-    visit.page.wait_for("h1").await;
+    visit.press("nav.index a[href^='/lab-sessions/']").await;
+    visit.page.wait_for("#emg table").await;
+    let (bottom, ..) = visit.page.lowest("#emg tbody tr:first-child").await;
+    assert!(bottom <= 800.0, "{bottom}");
     let emg = visit.page.text("main").await;
     assert!(emg.contains("EMG, left rectus femoris"), "{emg}");
     visit.page.resize(390, 844).await;

@@ -11,6 +11,8 @@ pub struct Group {
     pub heading: &'static str,
     /// What the figures show, in a sentence; empty: the heading says it.
     pub hint: String,
+    /// Whether pages show the figures only on request.
+    pub is_folded: bool,
     /// The figures, in reading order.
     pub figures: Vec<Figure>,
 }
@@ -18,6 +20,6 @@ pub struct Group {
 impl Group {
     pub(super) fn new(id: &'static str, heading: &'static str, hint: impl Into<String>, charts: Vec<Chart>) -> Self {
         let figures = charts.into_iter().map(|chart| Figure::chart(id, chart)).collect();
-        Self { id, heading, hint: hint.into(), figures }
+        Self { id, heading, hint: hint.into(), is_folded: false, figures }
     }
 }

@@ -159,6 +159,46 @@ pub fn measured_beside_reference(
     Some(chart.with("this file", 0, Stroke::Solid, measured))
 }
 
+/// A measured angle at 0, 1, ..., 100 % of the cycle of the leg of its joint.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasuredAngle<'a> {
+    /// Name in the legend.
+    pub name: &'a str,
+    /// Colour of the measured line.
+    pub colour: usize,
+    /// Stroke of the measured line.
+    pub stroke: Stroke,
+    /// Mean, rad.
+    pub mean_rad: &'a [f64],
+    /// Standard deviation, rad.
+    pub standard_deviation_rad: &'a [f64],
+    /// The gait of the walk, if it is known, with the colour of its line.
+    pub gait: Option<(&'a Gait, usize)>,
+}
+
+/// Measured angles over the cycle of their leg, each beside the computed angle of its gait. `joint` is its place among the joints of
+/// the walker.
+pub fn measured_beside_gaits(title: &str, joint: usize, walks: &[MeasuredAngle<'_>]) -> Option<Chart> {
+    let (_, _, leg) = *MEASURED.get(joint)?;
+    let line = |angles: &[f64]| angles.iter().enumerate().map(|(at, angle)| (at as f64, angle.to_degrees())).collect();
+    let with = |chart: Chart, walk: &MeasuredAngle<'_>| {
+        let band = walk.mean_rad.iter().zip(walk.standard_deviation_rad).enumerate();
+        let band =
+            band.map(|(at, (mean, sd))| (at as f64, (mean - sd).to_degrees(), (mean + sd).to_degrees())).collect();
+        let chart = chart.with_band(&format!("{ONE_DEVIATION}, {}", walk.name), walk.colour, band);
+        let chart = chart.with(&format!("measured, {}", walk.name), walk.colour, walk.stroke, line(walk.mean_rad));
+        match walk.gait {
+            Some((gait, colour)) => {
+                let label = format!("computed, {}", walk.name);
+                let look = Look { label: &label, colour, stroke: Stroke::Dashed };
+                Cycle::of(gait).with_line(chart, leg, &look, |point| point.q[joint + 2].to_degrees())
+            }
+            None => chart,
+        }
+    };
+    Some(walks.iter().fold(chart(title, &cycle_of_leg(leg)), with))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

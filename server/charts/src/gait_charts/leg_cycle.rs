@@ -210,6 +210,7 @@ mod tests {
             domain,
             q: &ANGLES,
             qd: &ANGLES,
+            qdd: &ANGLES,
             u: &TORQUES,
             forces: [0.0; 8],
             activation: None,

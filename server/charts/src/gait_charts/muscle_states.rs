@@ -1,10 +1,13 @@
-//! Activations and fibre lengths of the muscles.
+//! Activations, forces and fibre lengths of the muscles.
 
 use super::group::Group;
 use super::leg_cycle::{Cycle, Leg};
 use super::legs::CYCLE;
 use crate::Chart;
 use crate::gait_series::Point;
+use gait_optimizer::Gait;
+use gait_optimizer::body::GRAVITY;
+use gait_optimizer::muscle::tendon_force;
 
 /// Title, and place among the muscles of the left and the right leg.
 const MUSCLES: [(&str, usize, Option<usize>); 7] = [
@@ -28,6 +31,23 @@ pub(super) fn activations(cycle: &Cycle<'_>) -> Group {
     Group::new("muscles", "Muscle activation", "The right leg has the muscles of the residual limb.", charts)
 }
 
+/// Force of each muscle, that of its tendon.
+pub(super) fn forces(cycle: &Cycle<'_>, gait: &Gait) -> Group {
+    let muscles = gait.settings.muscles.muscles(&gait.subject);
+    let weight_n = gait.subject.body_mass_kg * GRAVITY;
+    let force = |p: &Point<'_>, muscle: usize| {
+        let (Some(fibre), Some(unit)) = (p.fibre_length, muscles.get(muscle)) else { return f64::NAN };
+        let tendon_m = unit.unit_length(p.q) - fibre[muscle] * unit.optimal_length_m;
+        unit.max_force_n * tendon_force(tendon_m / unit.slack_length_m - 1.0).value / weight_n
+    };
+    let mut charts = of_muscles(cycle, "force, body weight", force);
+    for chart in &mut charts {
+        chart.y_range = Some((0.0, 0.1));
+    }
+    let hint = "The force of each muscle, which its tendon transmits, normalised to body weight.";
+    Group::new("muscle-forces", "Muscle forces", hint, charts)
+}
+
 /// Fibre length of each muscle.
 pub(super) fn fibre_lengths(cycle: &Cycle<'_>) -> Group {
     let length = |p: &Point<'_>, muscle: usize| p.fibre_length.map_or(f64::NAN, |all| all[muscle]);
@@ -36,7 +56,7 @@ pub(super) fn fibre_lengths(cycle: &Cycle<'_>) -> Group {
 }
 
 /// A chart for each muscle.
-fn of_muscles(cycle: &Cycle<'_>, unit: &str, state: fn(&Point<'_>, usize) -> f64) -> Vec<Chart> {
+fn of_muscles(cycle: &Cycle<'_>, unit: &str, state: impl Fn(&Point<'_>, usize) -> f64) -> Vec<Chart> {
     let chart = |&(muscle, left, right): &(&str, usize, Option<usize>)| {
         let chart = cycle.with_leg(Chart::new(muscle, CYCLE, unit), Leg::Left, |p| state(p, left));
         match right {

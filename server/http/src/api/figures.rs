@@ -1,7 +1,7 @@
 //! REST: downloads of figures as SVG, PNG and CSV.
 
 use crate::AppState;
-use crate::accessible::{Id, Named, accessible, all_accessible};
+use crate::accessible::{Id, Named, all_accessible};
 use crate::attachment::attachment;
 use crate::authorization::Authorized;
 use crate::extractors::Params;
@@ -18,11 +18,12 @@ use gaitwright_service::error::Error;
 use gaitwright_store::{LabSessionId, ReferenceGaitId, StudyId, TrialId, reference_gaits};
 use serde::Deserialize;
 
-/// A second study for comparison.
+/// Other studies for comparison.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ComparedStudy {
-    other: Option<Named<StudyId>>,
+    #[serde(default)]
+    other: Vec<Named<StudyId>>,
 }
 
 /// What a figure of a trial shows.
@@ -36,7 +37,7 @@ pub(super) struct ShownGait {
 
 /// Download a figure of a study
 ///
-/// Progress, answers, and curves of the recommended gait; with `other`, of both studies.
+/// Progress, answers, and curves of the recommended gait; with `other`, of all these studies.
 #[utoipa::path(
     get,
     path = "/studies/{id}/figures/{file}",
@@ -45,7 +46,7 @@ pub(super) struct ShownGait {
     params(
         ("id" = StudyId, Path, description = "Identifier of the study"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("other" = Option<StudyId>, Query, description = "Identifier of a study for comparison")
+        ("other" = Option<String>, Query, description = "1 to 5 comma-separated identifiers of studies for comparison")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -57,8 +58,8 @@ pub(super) async fn of_study(
     Path((_, file)): Path<(String, String)>,
     Params(ComparedStudy { other }): Params<ComparedStudy>,
 ) -> Result<Response, Refusal> {
-    let other = accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
-    let figures = study::of_study(&mut app, id, other).await?.into_figures();
+    let others = all_accessible(&mut *app.read().await?, authorized.caller.reach(), other).await?;
+    let figures = study::of_study(&mut app, id, &others).await?.into_figures();
     response(&mut app, figures, file).await
 }
 

@@ -35,6 +35,7 @@ mod sessions;
 mod studies;
 mod study_archives;
 mod study_comparison;
+mod study_sort;
 mod subjects;
 mod suggestions;
 mod tokens;

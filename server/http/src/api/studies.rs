@@ -1,5 +1,6 @@
 //! REST: studies.
 
+use super::study_sort::StudySort;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -55,11 +56,13 @@ pub(super) struct StudyQuery {
     state: Option<StudyState>,
     #[serde(default)]
     archived: bool,
+    #[serde(default)]
+    sort: StudySort,
 }
 
 /// List studies
 ///
-/// Newest first.
+/// Newest first, unless `sort` names another order.
 #[utoipa::path(
     get,
     path = "/studies",
@@ -70,7 +73,8 @@ pub(super) struct StudyQuery {
         ("text" = Option<String>, Query, description = "Only studies whose name, tags, notes or subject's pseudonym contains this text"),
         ("tag" = Option<String>, Query, description = "Only studies with this tag"),
         ("state" = Option<StudyState>, Query, description = "Only studies in this state"),
-        ("archived" = Option<bool>, Query, description = "If true, only archived studies. If false (the default), only studies that are not archived")
+        ("archived" = Option<bool>, Query, description = "If true, only archived studies. If false (the default), only studies that are not archived"),
+        ("sort" = Option<String>, Query, description = "Column to sort by: `created_at`, `name` or `state`. A leading minus sorts in descending order")
     ),
     responses((status = 200, description = "A page", body = Page<StudyWithCommands>)),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -81,9 +85,10 @@ pub(super) async fn list(
     paging: Paging<StudyId, StudyQuery>,
 ) -> Result<Json<Page<StudyWithCommands>>, Refusal> {
     let mut reader = app.read().await?;
-    let (before, limit) = (paging.after, paging.to_read());
-    let StudyQuery { subject_id: subject, text, tag, state, archived } = paging.filter.clone();
-    let filter = StudyFilter { subject, text, tag, state, archived: Some(archived), before, limit };
+    let (after, limit) = (paging.after, paging.to_read());
+    let StudyQuery { subject_id: subject, text, tag, state, archived, sort } = paging.filter.clone();
+    let (archived, ascending) = (Some(archived), sort.ascending);
+    let filter = StudyFilter { subject, text, tag, state, archived, sort: sort.column, ascending, after, limit };
     let found = studies::page(&mut reader, authorized.caller.reach(), &filter).await?;
     let (found, next) = paging.page(found, |study| study.id)?.into_parts();
     let mut views = Vec::with_capacity(found.len());

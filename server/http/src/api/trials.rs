@@ -15,10 +15,11 @@ use axum::extract::State;
 use axum::response::Response;
 use gait_optimizer::IterationRecord;
 use gaitwright_service::access::{Read, Run};
+use gaitwright_service::error::Error;
 use gaitwright_service::job::JobId;
 use gaitwright_service::studies::cancelled_trial;
 use gaitwright_service::studies::command;
-use gaitwright_store::trial_list::{self, ListStart, Listing, SORTS, TrialPlace};
+use gaitwright_store::trial_list::{self, ListStart, Listing, RANGES, SORTS, TrialPlace, ValueRange};
 use gaitwright_store::trials::{self, TrialState};
 use gaitwright_store::{StudyId, TrialId, attempts, gaits, studies};
 use serde::de::{Deserialize, Deserializer, Error as _};
@@ -30,6 +31,38 @@ pub(super) struct TrialQuery {
     state: Option<TrialState>,
     #[serde(default)]
     sort: Sort,
+    range: Option<RangeColumn>,
+    from: Option<f64>,
+    to: Option<f64>,
+}
+
+impl TrialQuery {
+    fn range(&self) -> Result<Option<ValueRange>, Error> {
+        let ends = [("from", self.from), ("to", self.to)];
+        for (name, end) in ends {
+            if let Some(end) = end.filter(|end| !end.is_finite()) {
+                return Err(Error::invalid(name, end.to_string(), "a finite number"));
+            }
+        }
+        let Some(RangeColumn(column)) = self.range else {
+            let given = ends.into_iter().find_map(|(name, end)| Some((name, end?)));
+            return given.map_or(Ok(None), |(name, end)| Err(Error::invalid(name, end, "absent without range")));
+        };
+        let (from, to) = (self.from.unwrap_or(f64::MIN), self.to.unwrap_or(f64::MAX));
+        Ok(Some(ValueRange { column, from, to }))
+    }
+}
+
+/// The column whose range filters the list.
+#[derive(Debug, Clone, Copy)]
+struct RangeColumn(&'static str);
+
+impl<'de> Deserialize<'de> for RangeColumn {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let column = RANGES.into_iter().find(|column| *column == name);
+        column.map(Self).ok_or_else(|| D::Error::custom(format!("one of {}", RANGES.join(", "))))
+    }
 }
 
 /// The column to sort by. A leading minus sorts in descending order.
@@ -69,7 +102,10 @@ impl<'de> Deserialize<'de> for Sort {
     params(
         ("id" = StudyId, Path, description = "Identifier of the study"),
         ("state" = Option<TrialState>, Query, description = "Only trials in this state"),
-        ("sort" = Option<String>, Query, description = "Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a value come last")
+        ("sort" = Option<String>, Query, description = "Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a value come last"),
+        ("range" = Option<String>, Query, description = "Only trials whose value in this column is at least `from` and at most `to`. Trials without a value are left out"),
+        ("from" = Option<f64>, Query, description = "Least value in the column `range`, in the unit of the column. Without it, the range has no lower end"),
+        ("to" = Option<f64>, Query, description = "Greatest value in the column `range`. Without it, the range has no upper end")
     ),
     responses((status = 200, description = "A page", body = Page<Trial>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -80,7 +116,8 @@ pub(super) async fn of_study(
     Visible(id, _): Visible<StudyId, Read>,
     paging: Paging<TrialPlace, TrialQuery>,
 ) -> Result<Json<Page<Trial>>, Refusal> {
-    let TrialQuery { state, sort } = paging.filter;
+    let TrialQuery { state, sort, .. } = paging.filter;
+    let range = paging.filter.range()?;
     let mut reader = app.read().await?;
     studies::get(&mut reader, id).await?;
     let listing = Listing {
@@ -88,6 +125,7 @@ pub(super) async fn of_study(
         descending: sort.descending,
         state,
         contains: String::new(),
+        range,
         limit: paging.to_read(),
         start: paging.after.clone().map_or(ListStart::First, ListStart::After),
     };

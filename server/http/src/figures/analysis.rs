@@ -1,5 +1,6 @@
 //! The figures of the page *Analysis*: the posterior of the learner over the search space of a study.
 
+use super::cost_and_rmse::cost_and_rmse;
 use super::maps_over_two_bounds::{AxisChoice, chosen, maps};
 use super::trials_by_bound::{by_bound, parallel};
 use crate::bound_units::{self, meaning};
@@ -10,7 +11,7 @@ use gaitwright_compute::OnPool;
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::analysis::{Analysis, too_large_to_wait};
 use gaitwright_service::studies::snapshot::StudySnapshot;
-use gaitwright_store::{StudyId, feedback, studies, trials};
+use gaitwright_store::{StudyId, TrialId, feedback, studies, trials};
 use std::sync::Arc;
 
 /// Every figure of the page; empty if the page shows no analysis.
@@ -22,6 +23,7 @@ pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: AxisChoice)
     let draw = move |_: &OnPool| {
         let chosen = chosen(&analysis, &choice)?;
         let mut figures = marginals(&analysis);
+        figures.extend(cost_and_rmse(&snapshot, recommended(&snapshot, &analysis)));
         figures.extend(maps(&analysis, &snapshot, chosen).map_err(Error::Learner)?.figures);
         figures.extend(parallel(&snapshot, &analysis).map_err(Error::Learner)?);
         for dimension in 0..analysis.posterior.space().dimensions().len() {
@@ -30,6 +32,12 @@ pub(crate) async fn figures(app: &mut AppState, id: StudyId, choice: AxisChoice)
         Ok(figures)
     };
     app.compute(draw).await?
+}
+
+/// The trial that the study recommends. As on its page, none before people have answered.
+pub(crate) fn recommended(snapshot: &StudySnapshot, analysis: &Analysis) -> Option<TrialId> {
+    let best = analysis.gaits.first().filter(|_| !snapshot.waits_for_first_answer())?;
+    best.trials.first().copied()
 }
 
 /// The analysis of a study, or why the page does not show it.

@@ -3,7 +3,7 @@
 use gait_optimizer::Gait;
 use gait_optimizer::emg::{CHANNELS, CycleActivity, CycleStart, muscle_of};
 use gait_optimizer::limit_cycle::JOINTS;
-use gaitwright_charts::gait_charts;
+use gaitwright_charts::gait_charts::{self, MeasuredAngle};
 use gaitwright_charts::{Chart, Figure, Stroke};
 use gaitwright_service::studies::lab::{LabSessionView, LimitCycles, ProcessedEmg, WalkCondition};
 
@@ -99,6 +99,33 @@ fn look(walk: u8) -> (usize, Stroke) {
         2 => (0, Stroke::Solid),
         _ => (1, Stroke::Solid),
     }
+}
+
+/// Measured joint angles over the cycle of each leg: a chart for each joint with every walk, and the angles of the gait where it is
+/// known.
+pub(crate) fn joint_angles(session: &LabSessionView, measured: &[(LimitCycles, Option<Gait>)]) -> Vec<Figure> {
+    let names: Vec<String> = measured.iter().map(|(walk, _)| walk_name(session, walk.walk)).collect();
+    let chart = |(place, joint): (usize, &&str)| {
+        let walks: Vec<MeasuredAngle<'_>> = measured
+            .iter()
+            .zip(&names)
+            .filter_map(|((walk, gait), name)| {
+                let cycle = walk.cycles.iter().find(|cycle| cycle.joint == *joint)?;
+                let (colour, stroke) = look(walk.walk);
+                Some(MeasuredAngle {
+                    name,
+                    colour,
+                    stroke,
+                    mean_rad: &cycle.mean_rad,
+                    standard_deviation_rad: &cycle.standard_deviation_rad,
+                    gait: gait.as_ref().map(|gait| (gait, 2 + usize::from(walk.walk))),
+                })
+            })
+            .collect();
+        let chart = gait_charts::measured_beside_gaits(JOINT_NAMES[place], place, &walks)?;
+        (!walks.is_empty()).then(|| Figure::chart("angle", chart))
+    };
+    JOINTS.iter().enumerate().filter_map(chart).collect()
 }
 
 /// Measured limit cycles (figure 5 of the paper): a chart per joint and walk, over the limit cycle of the gait where it is known.

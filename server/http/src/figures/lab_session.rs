@@ -20,6 +20,7 @@ pub(crate) async fn of_session(app: &mut AppState, id: LabSessionId) -> Result<V
     drop(reader);
     let draw = move |_: &OnPool| {
         let mut figures = emg.map_or_else(Vec::new, |emg| lab_charts::emg(&session, &emg));
+        figures.extend(lab_charts::joint_angles(&session, &cycles));
         figures.extend(lab_charts::limit_cycles(&session, &cycles));
         figures
     };

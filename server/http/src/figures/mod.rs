@@ -2,6 +2,7 @@
 
 pub(crate) mod analysis;
 pub(crate) mod atlas_maps;
+mod cost_and_rmse;
 pub(crate) mod lab_charts;
 pub(crate) mod lab_session;
 pub(crate) mod maps_over_two_bounds;
@@ -15,7 +16,8 @@ pub(crate) mod trial;
 pub(crate) mod trials_by_bound;
 mod utility;
 
+pub(crate) use cost_and_rmse::cost_and_rmse;
 pub(crate) use outcome::StudyOutcome;
 pub(crate) use study_progress::{COURSE, course, warm_starts};
-pub(crate) use study_results::{StudyResults, have_one_reference_gait};
+pub(crate) use study_results::{MAX_IN_A_CHART, StudyResults, have_one_reference_gait};
 pub(crate) use utility::utility;

@@ -1,8 +1,8 @@
-//! The figures of a study, or of two.
+//! The figures of a study, or of several.
 
 use super::outcome::StudyOutcome;
 use super::study_progress::{COURSE, course, warm_starts};
-use super::study_results::{StudyResults, have_one_reference_gait};
+use super::study_results::{MAX_IN_A_CHART, StudyResults, have_one_reference_gait};
 use crate::shared_state::AppState;
 use gait_optimizer::gait::stick_figure::stick_figures;
 use gait_optimizer::{Gait, ReferenceGait};
@@ -22,7 +22,7 @@ pub(crate) struct FigureSection {
     pub(crate) figures: Vec<Figure>,
 }
 
-/// The figures of a study, or of two.
+/// The figures of a study, or of several.
 #[derive(Debug)]
 pub(crate) struct StudyFigures {
     pub(crate) study: Study,
@@ -82,14 +82,20 @@ impl StudyWithBest {
     }
 }
 
-/// The paper's figures for a study, and optionally for a second one.
+/// The paper's figures for a study, and for others beside it.
 ///
 /// # Errors
-/// A conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
-pub(crate) async fn of_study(app: &mut AppState, id: StudyId, other: Option<StudyId>) -> Result<StudyFigures, Error> {
+/// [`Error::Invalid`] for more than [`MAX_IN_A_CHART`] studies; a conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
+pub(crate) async fn of_study(app: &mut AppState, id: StudyId, others: &[StudyId]) -> Result<StudyFigures, Error> {
+    if others.len() >= MAX_IN_A_CHART {
+        let most = format!("at most {} studies", MAX_IN_A_CHART - 1);
+        return Err(Error::invalid("other", others.len(), &most));
+    }
     let mut shown = vec![StudyWithBest::read(app, id).await?];
-    if let Some(other) = other.filter(|other| *other != id) {
-        shown.push(StudyWithBest::read(app, other).await?);
+    for (place, &other) in others.iter().enumerate() {
+        if other != id && !others[..place].contains(&other) {
+            shown.push(StudyWithBest::read(app, other).await?);
+        }
     }
     let mut reader = app.read().await?;
     let reference = shown[0].results.snapshot.study.plan.reference_gait_id;

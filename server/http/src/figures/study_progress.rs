@@ -20,8 +20,8 @@ pub(crate) fn course(studies: &[(&StudySnapshot, &StudyOutcome)]) -> Option<Char
         chart = chart.with("trial", 7, Stroke::Points, converged(snapshot));
         chart = chart.with("best action so far", 0, Stroke::Steps, outcome.course());
     } else {
-        for (place, (snapshot, outcome)) in studies.iter().enumerate() {
-            let stroke = if place == 0 { Stroke::Steps } else { Stroke::DashedSteps };
+        let strokes = Stroke::DISTINCT_STEPS.into_iter().cycle();
+        for ((place, (snapshot, outcome)), stroke) in studies.iter().enumerate().zip(strokes) {
             chart = chart.with(&snapshot.study.plan.name, place, stroke, outcome.course());
         }
     }

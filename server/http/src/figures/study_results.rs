@@ -13,6 +13,9 @@ use gaitwright_store::{Connection, StudyId, consents, devices, feedback, referen
 /// How many of the newest trials of a large study are drawn.
 const NEWEST: u32 = 200;
 
+/// Maximum number of studies in one chart.
+pub(crate) const MAX_IN_A_CHART: usize = 6;
+
 /// Whether these studies have the same reference gait. Otherwise their Gait RMSE measures different things.
 pub(crate) fn have_one_reference_gait(studies: &[&StudySnapshot]) -> bool {
     studies.windows(2).all(|pair| pair[0].study.plan.reference_gait_id == pair[1].study.plan.reference_gait_id)

@@ -7,7 +7,8 @@ use crate::AppState;
 use crate::authorization::Authorized;
 use crate::bound_units;
 use crate::extractors::Params;
-use crate::figures::analysis::{AnalysisState, analysis_of, marginals};
+use crate::figures::analysis::{AnalysisState, analysis_of, marginals, recommended};
+use crate::figures::cost_and_rmse;
 use crate::figures::maps_over_two_bounds::{AxisChoice, DimensionChoice, MAP_NOTES, Maps, chosen, maps};
 use crate::figures::trials_by_bound::{DRAWN, by_bound, parallel};
 use crate::format::{self, decimal, percent};
@@ -50,6 +51,8 @@ struct ShownAnalysis {
     gaits: Vec<GaitRow>,
     /// So many gaits are not in that list.
     more_gaits: usize,
+    /// Cost of transport against Gait RMSE.
+    cost: Option<PageChart>,
     main_effects: Vec<MainEffectRow>,
     marginals: Vec<PageChart>,
     legend: Vec<(String, String)>,
@@ -160,6 +163,7 @@ fn show(
         recommends,
         gaits: analysis.gaits.iter().take(MAX_LISTED).map(|gait| gait_row(gait, analysis, snapshot)).collect(),
         more_gaits: analysis.gaits.len().saturating_sub(MAX_LISTED),
+        cost: cost_and_rmse(snapshot, recommended(snapshot, analysis)).as_ref().map(drawn),
         main_effects: main_effects(analysis),
         legend: shared_legend(&mut marginals),
         marginals,

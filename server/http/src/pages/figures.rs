@@ -67,7 +67,7 @@ pub(super) async fn get(
     };
     let reach = authorized.caller.reach();
     let other = accessible(&mut *app.read().await?, reach, other).await?;
-    let StudyFigures { study, best, without_gait, sections, .. } = of_study(&mut app, id, other).await?;
+    let StudyFigures { study, best, without_gait, sections, .. } = of_study(&mut app, id, other.as_slice()).await?;
     let mut reader = app.read().await?;
     let mut offered = studies::page(&mut reader, reach, &StudyFilter::newest(OFFERED)).await?;
     offered.retain(|offered| offered.id != id);

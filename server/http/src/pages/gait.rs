@@ -299,6 +299,8 @@ struct ChartSection {
     id: &'static str,
     heading: &'static str,
     hint: String,
+    /// Whether the charts are shown only on request.
+    is_folded: bool,
     /// The legend of all charts; empty if each has its own.
     legend: Vec<(String, String)>,
     charts: Vec<PageChart>,
@@ -308,8 +310,8 @@ impl ChartSection {
     /// The charts of a group, whose files are in a folder, with a query.
     fn new(group: gait_charts::Group, files: &str, query: &str) -> Self {
         let mut charts: Vec<PageChart> = group.figures.iter().map(|f| PageChart::of(f, files, query)).collect();
-        let gait_charts::Group { id, heading, hint, .. } = group;
-        Self { id, heading, hint, legend: shared_legend(&mut charts), charts }
+        let gait_charts::Group { id, heading, hint, is_folded, .. } = group;
+        Self { id, heading, hint, is_folded, legend: shared_legend(&mut charts), charts }
     }
 }
 

@@ -14,11 +14,12 @@ use gaitwright_charts::sparkline;
 use gaitwright_service::access::{Rate, Read, RequiredRight, Run, sign_in};
 use gaitwright_service::error::Error;
 use gaitwright_service::studies::lifecycle;
-use gaitwright_store::studies::{AnswerSource, Study, StudyFilter, StudyState};
+use gaitwright_store::studies::{AnswerSource, Study, StudyColumn, StudyFilter, StudyState};
 use gaitwright_store::trials::TrialCounts;
 use gaitwright_store::{Connection, StudyId, consents, reference_gaits, studies, subjects, trials};
 use serde::Deserialize;
 
+const DESCENDING: &str = "descending";
 /// How many studies the page shows.
 const PAGE: u32 = 100;
 
@@ -61,7 +62,11 @@ pub(super) struct ListQuery {
     state: String,
     /// Present for archived studies.
     archived: Option<String>,
-    before: Option<StudyId>,
+    /// The name of the column to sort by; empty for the newest first.
+    sort: String,
+    /// `descending`, or ascending.
+    order: String,
+    after: Option<StudyId>,
 }
 
 impl ListQuery {
@@ -83,18 +88,45 @@ impl ListQuery {
                 Some(known.ok_or_else(|| Error::invalid("state", text, "a state from the list"))?)
             }
         };
+        let sort = StudyColumn::ALL.into_iter().find(|column| column.as_str() == self.sort);
+        let (sort, ascending) = match sort {
+            Some(sort) => (sort, self.order != DESCENDING),
+            None if self.sort.is_empty() => (StudyColumn::CreatedAt, false),
+            None => return Err(Error::invalid("sort", self.sort.as_str(), "a column from the list")),
+        };
         let (text, tag) = (self.text.trim().to_owned(), self.tag.clone());
         let archived = Some(self.archived.is_some());
-        Ok(StudyFilter { subject: None, text, tag, state, archived, before: self.before, limit })
+        Ok(StudyFilter { subject: None, text, tag, state, archived, sort, ascending, after: self.after, limit })
     }
 
-    /// The address of the studies after this one, with the same filter.
-    fn after(&self, study: StudyId) -> String {
-        let before = study.to_string();
+    /// The address of the studies after this one, with the same filter and order.
+    fn address_after(&self, study: StudyId) -> String {
+        self.address(&self.sort, &self.order, &study.to_string())
+    }
+
+    /// The address of the list sorted by a column: in ascending order, or in descending order if it is in ascending order already.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn sorted_by(&self, column: &StudyColumn) -> String {
+        let order = if self.direction(column) == "ascending" { DESCENDING } else { "ascending" };
+        self.address(column.as_str(), order, "")
+    }
+
+    /// The direction in which the list is sorted by a column; empty if it is sorted by another one.
+    #[allow(clippy::trivially_copy_pass_by_ref)] // templates pass references
+    fn direction(&self, column: &StudyColumn) -> &'static str {
+        match (self.sort.as_str(), column) {
+            ("", StudyColumn::CreatedAt) => DESCENDING,
+            (sort, column) if sort == column.as_str() && self.order == DESCENDING => DESCENDING,
+            (sort, column) if sort == column.as_str() => "ascending",
+            _ => "",
+        }
+    }
+
+    fn address(&self, sort: &str, order: &str, after: &str) -> String {
+        let archived = self.archived.as_deref().unwrap_or_default();
         let mut pairs = vec![("text", self.text.as_str()), ("tag", &self.tag), ("state", &self.state)];
-        pairs.extend(self.archived.as_deref().map(|archived| ("archived", archived)));
+        pairs.extend([("archived", archived), ("sort", sort), ("order", order), ("after", after)]);
         pairs.retain(|(_, value)| !value.is_empty());
-        pairs.push(("before", &before));
         serde_urlencoded::to_string(pairs).map_or_else(|_| "/".to_owned(), |query| format!("/?{query}"))
     }
 }
@@ -164,7 +196,7 @@ async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) 
     let mut found = studies::page(&mut reader, reach, &filter.filter(PAGE + 1)?).await?;
     let more = found.len() > PAGE as usize;
     found.truncate(PAGE as usize);
-    let next = found.last().filter(|_| more).map(|study| filter.after(study.id));
+    let next = found.last().filter(|_| more).map(|study| filter.address_after(study.id));
     let mut rows = Vec::new();
     for study in found {
         rows.push(row(&mut reader, study).await?);
@@ -172,7 +204,7 @@ async fn show(app: &AppState, authorized: &Authorized<Read>, filter: ListQuery) 
     let waiting = waiting_studies(&mut reader, reach, PAGE).await?;
     let no_password = sign_in::has_no_password(&mut reader, &authorized.caller).await?;
     let tags = studies::tags(&mut reader, reach).await?;
-    let (later, may_run) = (filter.before.is_some(), authorized.caller.may(Run::NEEDED));
+    let (later, may_run) = (filter.after.is_some(), authorized.caller.may(Run::NEEDED));
     page(&Home { no_password, waiting, studies: rows, later, next, filter, tags, states: STATES, may_run })
 }
 

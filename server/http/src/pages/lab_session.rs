@@ -43,6 +43,9 @@ struct SessionPage {
     /// Recorded walks, for which files can be uploaded.
     recorded: Vec<UploadWalk>,
     recordings: Vec<MeasurementFile>,
+    /// Measured joint angles over the cycle of each leg, and their legend.
+    joint_angles: Vec<PageChart>,
+    angle_legend: Vec<(String, String)>,
     has_emg: bool,
     forms: Forms,
     filters: FilterFields,
@@ -52,6 +55,18 @@ struct SessionPage {
     /// The answer of the subject, in words.
     answer_in_words: &'static str,
     session: LabSessionView,
+}
+
+impl SessionPage {
+    /// Whether something was measured, which the page then shows before walks, files and forms.
+    fn has_results(&self) -> bool {
+        self.measured.is_some() || !self.joint_angles.is_empty() || !self.limit_cycles.is_empty()
+    }
+
+    /// Whether the user can upload files of walks.
+    fn accepts_files(&self) -> bool {
+        self.may_run && self.session.closed.is_none() && !self.recorded.is_empty()
+    }
 }
 
 /// A recorded walk, and which kinds of files it has.
@@ -193,6 +208,7 @@ pub(super) async fn get(
 /// The charts of a session.
 struct Drawings {
     emg: Vec<PageChart>,
+    joint_angles: Vec<PageChart>,
     limit_cycles: Vec<PageChart>,
 }
 
@@ -216,10 +232,14 @@ pub(super) async fn show(
         let files = format!("/api/v1/lab-sessions/{id}/figures");
         let drawn = |figures: &[Figure]| figures.iter().map(|figure| PageChart::of(figure, &files, "")).collect();
         let of_emg = emg.as_ref().map_or_else(Vec::new, |emg| drawn(&lab_charts::emg(&session, emg)));
-        let drawings = Drawings { emg: of_emg, limit_cycles: drawn(&lab_charts::limit_cycles(&session, &cycles)) };
+        let drawings = Drawings {
+            emg: of_emg,
+            joint_angles: drawn(&lab_charts::joint_angles(&session, &cycles)),
+            limit_cycles: drawn(&lab_charts::limit_cycles(&session, &cycles)),
+        };
         (session, emg, drawings)
     };
-    let (session, emg, drawings) = app.compute(draw).await.map_err(Error::from)?;
+    let (session, emg, mut drawings) = app.compute(draw).await.map_err(Error::from)?;
     let recorded = UploadWalk::all(&session, &recordings);
     // The form offers the next walk without a file: the newest file of a walk replaces earlier ones.
     let next = |has: fn(&UploadWalk) -> bool| recorded.iter().find(|walk| !has(walk)).map_or(0, |walk| walk.number);
@@ -250,6 +270,8 @@ pub(super) async fn show(
             .unwrap_or_else(|| emg.as_ref().map(|emg| emg.result.settings).unwrap_or_default().into()),
         forms,
         measured: emg.as_ref().map(|emg| MeasuredActivity::of(&session, emg, drawings.emg)),
+        angle_legend: shared_legend(&mut drawings.joint_angles),
+        joint_angles: drawings.joint_angles,
         limit_cycles: drawings.limit_cycles,
         refused,
         answer_in_words: session.answer.as_ref().map_or("", |answer| format::walks_in_words(answer.answer)),

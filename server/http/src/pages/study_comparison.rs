@@ -1,14 +1,14 @@
-//! The page that compares two studies in one chart and one table.
+//! The page that compares studies in one chart and one table.
 
 use super::page_chart::PageChart;
 use super::study::preferred;
 use super::walking_pair::{WalkingGait, walking_pair};
 use crate::AppState;
-use crate::accessible::{Named, accessible};
+use crate::accessible::{Named, all_accessible};
 use crate::authorization::Authorized;
 use crate::bound_units;
 use crate::extractors::Params;
-use crate::figures::{COURSE, StudyOutcome, StudyResults, course, have_one_reference_gait};
+use crate::figures::{COURSE, MAX_IN_A_CHART, StudyOutcome, StudyResults, course, have_one_reference_gait};
 use crate::format;
 use crate::page_error::{PageError, page};
 use crate::refused_fields::RefusedFields;
@@ -24,7 +24,8 @@ use gaitwright_service::studies::analysis::Analyses;
 use gaitwright_service::studies::lifecycle;
 use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::studies::{AnswerSource, Study, StudyFilter};
-use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects, trials};
+use gaitwright_store::trials::Trial;
+use gaitwright_store::{StudyId, SubjectId, TrialId, gaits, studies, subjects};
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -32,47 +33,54 @@ use std::sync::Arc;
 /// How many of the newest studies are offered.
 const OFFERED: u32 = 200;
 
-/// The two studies.
+/// The chosen studies.
 #[derive(Debug, Deserialize)]
 pub(super) struct StudiesQuery {
-    a: Option<Named<StudyId>>,
-    b: Option<Named<StudyId>>,
+    #[serde(default)]
+    study: Vec<Named<StudyId>>,
 }
 
 #[derive(Template)]
 #[template(path = "study_comparison.html")]
-struct SideBySide {
-    offered: Vec<Study>,
-    a: Option<StudyId>,
-    b: Option<StudyId>,
+struct StudyComparisonPage {
+    /// Studies that can be compared, and whether each is chosen.
+    offered: Vec<(Study, bool)>,
+    /// Maximum number of chosen studies.
+    most: usize,
     compared: Option<Compared>,
     refused: RefusedFields,
 }
 
-impl SideBySide {
-    fn is(chosen: Option<&StudyId>, study: &Study) -> bool {
-        chosen == Some(&study.id)
-    }
+/// The recommended gait of a study, or why there is none.
+struct RecommendedGait {
+    study: StudyId,
+    name: String,
+    /// The trial and its number.
+    trial: Option<(TrialId, u32)>,
+    gait_rmse_rad: Option<f64>,
+    /// What people say of the gait, and its figures.
+    words: String,
 }
 
 struct Compared {
-    a: Study,
-    b: Study,
     /// Whether the studies have the same reference gait; otherwise no Gait RMSE is shown.
     comparable: bool,
-    /// What the answers of people say of the recommended gait of each study: its name, and a sentence. Empty if people answer
-    /// in neither, because Gait RMSE alone then ranks the gaits.
-    answers: Vec<(String, String)>,
+    /// Whether Gait RMSE alone ranks the gaits of every study, so that the recommended gaits are sorted by it.
+    ranked: bool,
+    recommended: Vec<RecommendedGait>,
     /// The utility of the recommended gait of each study in which people answer.
     utilities: Vec<PageChart>,
     /// Gait RMSE of the best actions.
     chart: Option<PageChart>,
     /// Names of studies without a best action to draw.
     without_course: Vec<String>,
-    /// The best gaits of both studies; empty if one has none.
+    /// The best gaits of two studies; empty if one has none, and of more studies.
     walking: Vec<WalkingGait>,
+    /// Whether people answer in one of the studies.
+    asks_people: bool,
+    studies: Vec<(StudyId, String)>,
     /// Property, value of each study, and whether the values differ.
-    rows: Vec<(String, String, String, bool)>,
+    rows: Vec<(String, Vec<String>, bool)>,
 }
 
 /// `GET /studies/compare`.
@@ -87,53 +95,63 @@ pub(super) async fn get(
         subjects::consenting(&mut reader).await?.into_iter().map(|subject| subject.id).collect();
     let mut offered = studies::page(&mut reader, reach, &StudyFilter::newest(OFFERED)).await?;
     offered.retain(|study| shown.contains(&study.plan.subject_id));
-    let (a, b) = (accessible(&mut reader, reach, choice.a).await?, accessible(&mut reader, reach, choice.b).await?);
+    let mut chosen: Vec<StudyId> = Vec::new();
+    for id in all_accessible(&mut reader, reach, choice.study).await? {
+        if !chosen.contains(&id) {
+            chosen.push(id);
+        }
+    }
     let mut refused = RefusedFields::default();
-    let compared = match (a, b) {
-        (Some(a), Some(b)) if a == b => {
-            let message = "\u{201c}Study B\u{201d} is the same study as study A. Choose another one.";
-            refused = RefusedFields::of(FieldError::in_words("b", message).into(), &[])?;
+    let compared = match chosen.len() {
+        0 | 1 => {
+            drop(reader);
             None
         }
-        (Some(a), Some(b)) => {
-            let (a, b) = (StudyResults::read(&mut reader, a).await?, StudyResults::read(&mut reader, b).await?);
+        2..=MAX_IN_A_CHART => {
+            let mut read = Vec::new();
+            for &id in &chosen {
+                read.push(StudyResults::read(&mut reader, id).await?);
+            }
             drop(reader);
             let analyses = Arc::clone(&app.analyses);
-            let compared = app.compute(move |pool| compare(pool, a, b, &analyses)).await.map_err(Error::from)??;
-            Some(with_best_gaits(&mut app, compared).await?)
+            let compared = app.compute(move |pool| compare(pool, &read, &analyses)).await.map_err(Error::from)??;
+            Some(with_walkers(&mut app, compared).await?)
         }
-        _ => {
+        more => {
             drop(reader);
+            let message = format!("At most {MAX_IN_A_CHART} studies can be compared; {more} are chosen.");
+            refused = RefusedFields::of(FieldError::in_words("study", &message).into(), &[])?;
             None
         }
     };
     // The form proposes two different studies: the newest ones besides the chosen one.
-    let other_than = |taken: Option<StudyId>| offered.iter().map(|study| study.id).find(|id| Some(*id) != taken);
-    let a = a.or_else(|| other_than(b));
-    let b = b.filter(|b| Some(*b) != a).or_else(|| other_than(a));
-    Ok((refused.status(), page(&SideBySide { offered, a, b, compared, refused })?).into_response())
+    for study in &offered {
+        if chosen.len() < 2 && !chosen.contains(&study.id) {
+            chosen.push(study.id);
+        }
+    }
+    let offered = offered.into_iter().map(|study| (chosen.contains(&study.id), study));
+    let offered = offered.map(|(is_chosen, study)| (study, is_chosen)).collect();
+    let status = refused.status();
+    Ok((status, page(&StudyComparisonPage { offered, most: MAX_IN_A_CHART, compared, refused })?).into_response())
 }
 
-/// Adds the best gaits.
-async fn with_best_gaits(
-    app: &mut AppState,
-    (mut compared, best): (Compared, [Option<TrialId>; 2]),
-) -> Result<Compared, Error> {
-    let [Some(a), Some(b)] = best else { return Ok(compared) };
+/// Adds the walkers of two recommended gaits.
+async fn with_walkers(app: &mut AppState, mut compared: Compared) -> Result<Compared, Error> {
+    let [(a, name_a), (b, name_b)] = compared.studies.as_slice() else { return Ok(compared) };
+    let of = |study: StudyId| compared.recommended.iter().find(|gait| gait.study == study)?.trial;
+    let (Some((a, number_a)), Some((b, number_b))) = (of(*a), of(*b)) else { return Ok(compared) };
+    let names = (name_a.clone(), name_b.clone());
     let mut reader = app.read().await?;
-    let numbers = [trials::get(&mut reader, a).await?.number, trials::get(&mut reader, b).await?.number];
     let gaits = gaits::find(&mut reader, a).await?.zip(gaits::find(&mut reader, b).await?);
     drop(reader);
     let Some((gait_a, gait_b)) = gaits else { return Ok(compared) };
-    let names = [&compared.a, &compared.b].map(|study| study.plan.name.clone());
     let draw = move |pool: &OnPool| {
         let (gait_a, gait_b) = (gait_a.unpack(pool)?, gait_b.unpack(pool)?);
-        let [name_a, name_b] = names;
-        Ok::<_, Error>(
-            walking_pair([(a, numbers[0], name_a, &gait_a), (b, numbers[1], name_b, &gait_b)]).into_iter().flatten(),
-        )
+        let pair = [(a, number_a, names.0, &gait_a), (b, number_b, names.1, &gait_b)];
+        Ok::<_, Error>(walking_pair(pair)?.into_iter().collect())
     };
-    compared.walking = app.compute(draw).await??.collect();
+    compared.walking = app.compute(draw).await??;
     Ok(compared)
 }
 
@@ -142,9 +160,35 @@ fn people_answer(study: &Study) -> bool {
     study.plan.answer_source != AnswerSource::GaitRmse
 }
 
+impl RecommendedGait {
+    fn of(snapshot: &StudySnapshot, outcome: &StudyOutcome, comparable: bool, asks_people: bool) -> Self {
+        let best = outcome.best.and_then(|id| snapshot.trial(id));
+        let mut words = Vec::new();
+        if asks_people {
+            words.push(answers(snapshot, best));
+        } else if best.is_none() {
+            words.push("no gait is recommended yet".to_owned());
+        }
+        if let Some(trial) = best {
+            if let Some(rmse) = trial.gait_rmse_rad.filter(|_| comparable) {
+                words.push(format!("Gait RMSE {rmse:.4} rad"));
+            }
+            if let Some(cost) = trial.cost_of_transport.filter(|_| !asks_people && !comparable) {
+                words.push(format!("cost of transport {cost:.4}"));
+            }
+        }
+        Self {
+            study: snapshot.study.id,
+            name: snapshot.study.plan.name.clone(),
+            trial: best.map(|trial| (trial.id, trial.number)),
+            gait_rmse_rad: best.and_then(|trial| trial.gait_rmse_rad),
+            words: words.join(", "),
+        }
+    }
+}
+
 /// What the answers of people say of the recommended gait, as the end of a sentence about the study.
-fn answers(snapshot: &StudySnapshot, outcome: &StudyOutcome) -> String {
-    let best = outcome.best.and_then(|id| snapshot.trial(id));
+fn answers(snapshot: &StudySnapshot, best: Option<&Trial>) -> String {
     match best.map(|trial| preferred(trial, snapshot)) {
         _ if !people_answer(&snapshot.study) => "Gait RMSE answers every comparison".to_owned(),
         None => "no gait is recommended yet".to_owned(),
@@ -154,7 +198,7 @@ fn answers(snapshot: &StudySnapshot, outcome: &StudyOutcome) -> String {
 }
 
 /// The properties and results of a study.
-fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(String, String)> {
+fn properties(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(String, String)> {
     let plan = &study.snapshot.study.plan;
     let best = outcome.best.and_then(|id| study.snapshot.trial(id));
     let seconds: f64 = study.snapshot.trials.iter().filter_map(|trial| trial.seconds_total).sum();
@@ -190,44 +234,63 @@ fn rows(study: &StudyResults, outcome: &StudyOutcome, comparable: bool) -> Vec<(
     rows
 }
 
-fn compare(
-    pool: &OnPool,
-    a: StudyResults,
-    b: StudyResults,
-    analyses: &Analyses,
-) -> Result<(Compared, [Option<TrialId>; 2]), Error> {
-    let (of_a, of_b) = (a.outcome(pool, analyses)?, b.outcome(pool, analyses)?);
-    let comparable = have_one_reference_gait(&[&a.snapshot, &b.snapshot]);
-    let both = [(&a.snapshot, &of_a), (&b.snapshot, &of_b)];
-    let asks_people = both.iter().any(|(snapshot, _)| people_answer(&snapshot.study));
-    let named = |(snapshot, outcome): &(&StudySnapshot, &StudyOutcome)| {
-        (snapshot.study.plan.name.clone(), answers(snapshot, outcome))
-    };
+/// One row for each property, with the values of all studies.
+fn rows(of_studies: Vec<Vec<(String, String)>>) -> Vec<(String, Vec<String>, bool)> {
+    let mut rows: Vec<(String, Vec<String>, bool)> = Vec::new();
+    for (place, properties) in of_studies.into_iter().enumerate() {
+        for (at, (what, value)) in properties.into_iter().enumerate() {
+            match rows.get_mut(at).filter(|_| place > 0) {
+                Some((_, values, differ)) => {
+                    *differ |= values.first() != Some(&value);
+                    values.push(value);
+                }
+                None => rows.push((what, vec![value], false)),
+            }
+        }
+    }
+    rows
+}
+
+fn compare(pool: &OnPool, all: &[StudyResults], analyses: &Analyses) -> Result<Compared, Error> {
+    let outcomes: Vec<StudyOutcome> =
+        all.iter().map(|study| study.outcome(pool, analyses)).collect::<Result<_, _>>()?;
+    let both: Vec<(&StudySnapshot, &StudyOutcome)> = all.iter().map(|study| &study.snapshot).zip(&outcomes).collect();
+    let snapshots: Vec<&StudySnapshot> = both.iter().map(|(snapshot, _)| *snapshot).collect();
+    let comparable = have_one_reference_gait(&snapshots);
+    let asks_people = snapshots.iter().any(|snapshot| people_answer(&snapshot.study));
+    let ranked = comparable && !asks_people;
+    let recommended =
+        both.iter().map(|(snapshot, outcome)| RecommendedGait::of(snapshot, outcome, comparable, asks_people));
+    let mut recommended: Vec<RecommendedGait> = recommended.collect();
+    if ranked {
+        let rmse = |gait: &RecommendedGait| gait.gait_rmse_rad.unwrap_or(f64::INFINITY);
+        recommended.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
+    }
     let mut utilities = Vec::new();
-    for study in [&a, &b] {
+    for study in all {
         let files = format!("/api/v1/studies/{}/figures", study.snapshot.study.id);
         let title = format!("{}: utility of the recommended gait", study.snapshot.study.plan.name);
         let chart = study.utility(pool, analyses)?.map(|figure| PageChart::of(&figure, &files, ""));
         utilities.extend(chart.map(|chart| PageChart { title, ..chart }));
     }
+    let identifiers: Vec<String> = snapshots.iter().map(|snapshot| snapshot.study.id.to_string()).collect();
     let chart = if comparable { course(&both) } else { None };
-    let chart = chart.map(|chart| {
-        let files = format!("/api/v1/studies/{}/figures", a.snapshot.study.id);
-        PageChart::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", b.snapshot.study.id))
+    let chart = identifiers.split_first().zip(chart).map(|((first, others), chart)| {
+        let files = format!("/api/v1/studies/{first}/figures");
+        PageChart::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", others.join(",")))
     });
-    let properties = rows(&a, &of_a, comparable).into_iter().zip(rows(&b, &of_b, comparable));
-    let without_course = [(&a, &of_a), (&b, &of_b)].into_iter().filter(|(_, outcome)| outcome.course().is_empty());
-    let best = [of_a.best, of_b.best];
-    let compared = Compared {
-        walking: Vec::new(),
-        rows: properties.map(|((what, a), (_, b))| (what, a.clone(), b.clone(), a != b)).collect(),
-        without_course: without_course.map(|(side, _)| side.snapshot.study.plan.name.clone()).collect(),
+    let without_course = both.iter().filter(|(_, outcome)| outcome.course().is_empty());
+    let properties = all.iter().zip(&outcomes).map(|(study, outcome)| properties(study, outcome, comparable));
+    Ok(Compared {
         comparable,
-        answers: both.iter().filter(|_| asks_people).map(named).collect(),
+        ranked,
+        recommended,
         utilities,
         chart,
-        a: a.snapshot.study,
-        b: b.snapshot.study,
-    };
-    Ok((compared, best))
+        without_course: without_course.map(|(snapshot, _)| snapshot.study.plan.name.clone()).collect(),
+        walking: Vec::new(),
+        asks_people,
+        studies: snapshots.iter().map(|snapshot| (snapshot.study.id, snapshot.study.plan.name.clone())).collect(),
+        rows: rows(properties.collect()),
+    })
 }

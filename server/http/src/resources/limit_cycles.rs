@@ -39,7 +39,7 @@ pub(crate) struct LimitCycles {
 
 impl From<lab::LimitCycles> for LimitCycles {
     fn from(cycles: lab::LimitCycles) -> Self {
-        let lab::LimitCycles { walk, measurement_file_id, cutoff_hz, joints } = cycles;
+        let lab::LimitCycles { walk, measurement_file_id, cutoff_hz, joints, .. } = cycles;
         Self { walk, measurement_file_id, cutoff_hz, joints: joints.into_iter().map(Into::into).collect() }
     }
 }

@@ -5,7 +5,33 @@ use crate::accessible_studies::Reach;
 use crate::accessible_studies::{reach_values, reached};
 use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
 
-/// Which studies of those that a caller reaches.
+/// A column by which studies can be sorted.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum StudyColumn {
+    /// When the study was created.
+    #[default]
+    CreatedAt,
+    /// Its name, whatever its case.
+    Name,
+    /// Its state, in alphabetical order.
+    State,
+}
+
+impl StudyColumn {
+    /// Every column.
+    pub const ALL: [Self; 3] = [Self::CreatedAt, Self::Name, Self::State];
+
+    /// The name of the column.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::CreatedAt => "created_at",
+            Self::Name => "name",
+            Self::State => "state",
+        }
+    }
+}
+
+/// Which studies of those that a caller reaches, and in which order.
 #[derive(Debug, Clone, Default)]
 pub struct StudyFilter {
     /// Only studies of this subject.
@@ -18,8 +44,12 @@ pub struct StudyFilter {
     pub state: Option<StudyState>,
     /// Archived studies or the others. `None` for both.
     pub archived: Option<bool>,
-    /// Older than this one.
-    pub before: Option<StudyId>,
+    /// By which column they are sorted. Studies with the same value are sorted by creation, in the same direction.
+    pub sort: StudyColumn,
+    /// Whether in ascending order.
+    pub ascending: bool,
+    /// After this one in that order.
+    pub after: Option<StudyId>,
     /// At most so many.
     pub limit: u32,
 }
@@ -31,7 +61,7 @@ impl StudyFilter {
     }
 }
 
-/// Studies that a caller reaches, newest first.
+/// Studies that a caller reaches.
 ///
 /// # Errors
 /// Errors of the database.
@@ -40,16 +70,24 @@ pub async fn page(db: &mut Connection, reach: Reach, filter: &StudyFilter) -> St
     let sql = concat!(
         "select s.* from studies s join subjects p on p.id = s.subject_id where ",
         reached!("s.id"),
-        " and (?4 is null or s.id < ?4) and (?5 is null or s.subject_id = ?5) and (?6 is null or s.state = ?6) \
+        " and (?4 is null or exists (select 1 from studies f where f.id = ?4 and case when ?12 \
+             then (case ?11 when 'name' then lower(s.name) when 'state' then s.state else '' end, s.id) \
+                 > (case ?11 when 'name' then lower(f.name) when 'state' then f.state else '' end, f.id) \
+             else (case ?11 when 'name' then lower(s.name) when 'state' then s.state else '' end, s.id) \
+                 < (case ?11 when 'name' then lower(f.name) when 'state' then f.state else '' end, f.id) end)) \
+         and (?5 is null or s.subject_id = ?5) and (?6 is null or s.state = ?6) \
          and (?7 is null or (s.archived_at is not null) = ?7) \
          and (?8 = '' or instr(lower(s.name || char(10) || p.pseudonym || char(10) || coalesce(s.tags, '') \
                                      || char(10) || coalesce(s.notes, '')), lower(?8))) \
          and (?9 = '' or exists (select 1 from json_each(s.tags) where value = ?9)) \
-         order by s.id desc limit ?10"
+         order by case when ?12 then case ?11 when 'name' then lower(s.name) when 'state' then s.state else '' end end, \
+             case when ?12 then null else case ?11 when 'name' then lower(s.name) when 'state' then s.state else '' end end desc, \
+             case when ?12 then s.id end, s.id desc limit ?10"
     );
-    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(filter.before).bind(filter.subject);
+    let query = sqlx::query(sql).bind(every).bind(open).bind(principal).bind(filter.after).bind(filter.subject);
     let query = query.bind(filter.state.map(StudyState::as_str)).bind(filter.archived);
     let query = query.bind(&filter.text).bind(&filter.tag).bind(filter.limit);
+    let query = query.bind(filter.sort.as_str()).bind(filter.ascending);
     query.fetch_all(db).await?.iter().map(from_row).collect()
 }
 

@@ -64,12 +64,12 @@ class FiguresMethods(Transport):
             query={"x": x, "y": y},
         )
 
-    def get_study_figure(self, study_id: StudyId, file: str, *, other: Optional[StudyId] = None) -> bytes:
+    def get_study_figure(self, study_id: StudyId, file: str, *, other: Optional[str] = None) -> bytes:
         """Download a figure of a study.
 
-        Progress, answers, and curves of the recommended gait; with `other`, of both studies.
+        Progress, answers, and curves of the recommended gait; with `other`, of all these studies.
 
-        other: Identifier of a study for comparison.
+        other: 1 to 5 comma-separated identifiers of studies for comparison.
         """
         return self.request_bytes(
             "GET",

@@ -6,7 +6,7 @@ Made by generate.py from server/openapi.json.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Optional, cast
+from typing import Literal, Optional, cast
 
 from ..events import Event, follow
 from ..paging import Pages
@@ -41,11 +41,12 @@ class StudiesMethods(Transport):
         tag: Optional[str] = None,
         state: Optional[StudyState] = None,
         archived: Optional[bool] = None,
+        sort: Optional[Literal["created_at", "-created_at", "name", "-name", "state", "-state"]] = None,
         page_size: Optional[int] = None,
     ) -> Pages[StudyWithCommands]:
         """List studies.
 
-        Newest first.
+        Newest first, unless `sort` names another order.
 
         subject_id: Only studies of this subject.
 
@@ -56,11 +57,13 @@ class StudiesMethods(Transport):
         state: Only studies in this state.
 
         archived: If true, only archived studies. If false (the default), only studies that are not archived.
+
+        sort: Column to sort by: `created_at`, `name` or `state`. A leading minus sorts in descending order.
         """
         return Pages(
             self,
             "/api/v1/studies",
-            query={"subject_id": subject_id, "text": text, "tag": tag, "state": state, "archived": archived, "limit": page_size},
+            query={"subject_id": subject_id, "text": text, "tag": tag, "state": state, "archived": archived, "sort": sort, "limit": page_size},
         )
 
     def create_study(self, *, idempotency_key: Optional[str] = None, **body: Unpack[NewStudy]) -> StudyWithCommands:

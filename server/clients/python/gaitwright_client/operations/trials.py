@@ -35,6 +35,7 @@ ListTrialsSort = Literal[
     "-cost_of_transport", "iterations", "-iterations", "seconds_total", "-seconds_total", "a1", "-a1", "a2", "-a2",
     "a3", "-a3", "a4", "-a4", "a5", "-a5", "a6", "-a6", "a7", "-a7", "a8", "-a8",
 ]
+ListTrialsRange = Literal["gait_rmse_rad", "cost_of_transport", "a1", "a2", "a3", "a4", "a5", "a6", "a7", "a8"]
 
 
 class TrialsMethods(Transport):
@@ -46,6 +47,9 @@ class TrialsMethods(Transport):
         *,
         state: Optional[TrialState] = None,
         sort: Optional[ListTrialsSort] = None,
+        range: Optional[ListTrialsRange] = None,
+        from: Optional[float] = None,
+        to: Optional[float] = None,
         page_size: Optional[int] = None,
     ) -> Pages[Trial]:
         """List trials of a study.
@@ -57,12 +61,19 @@ class TrialsMethods(Transport):
 
         sort: Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a
         value come last.
+
+        range: Only trials whose value in this column is at least `from` and at most `to`. Trials without a value are
+        left out.
+
+        from: Least value in the column `range`, in the unit of the column. Without it, the range has no lower end.
+
+        to: Greatest value in the column `range`. Without it, the range has no upper end.
         """
         return Pages(
             self,
             "/api/v1/studies/{id}/trials",
             {"id": study_id},
-            query={"state": state, "sort": sort, "limit": page_size},
+            query={"state": state, "sort": sort, "range": range, "from": from, "to": to, "limit": page_size},
         )
 
     def get_trials_csv(self, study_id: StudyId) -> str:

@@ -3,10 +3,11 @@
 
 use crate::bound_units;
 use crate::format::{self, words};
+use crate::pages::form_numbers;
 use crate::paging::ListFingerprint;
 use gait_optimizer::TunedBounds;
 use gaitwright_service::error::Error;
-use gaitwright_store::trial_list::{self, ListStart, ListedTrial, Listing, SORTS};
+use gaitwright_store::trial_list::{self, ListStart, ListedTrial, Listing, RANGES, SORTS, ValueRange};
 use gaitwright_store::trials::{TrialCounts, TrialState};
 use gaitwright_store::{Connection, StudyId, TrialId};
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,10 @@ pub(crate) struct TrialsQuery {
     pub(super) order: String,
     state: String,
     pub(super) text: String,
+    /// The column whose range filters the table; empty for none. Its ends as typed, in the unit of the table.
+    range: String,
+    pub(super) from: String,
+    pub(super) to: String,
     /// Cursor of the last trial of the previous page; empty for the first page.
     #[serde(skip_serializing_if = "String::is_empty")]
     after: String,
@@ -41,6 +46,9 @@ impl Default for TrialsQuery {
             order: DESCENDING.to_owned(),
             state: String::new(),
             text: String::new(),
+            range: String::new(),
+            from: String::new(),
+            to: String::new(),
             after: String::new(),
             before: String::new(),
             shown: String::new(),
@@ -67,16 +75,29 @@ impl TrialsQuery {
             descending: self.order == DESCENDING,
             state,
             contains: self.text.trim().to_owned(),
+            range: self.value_range()?,
             limit: PAGE,
             start: self.start(list)?,
         })
     }
 
+    fn value_range(&self) -> Result<Option<ValueRange>, Error> {
+        if self.range.is_empty() {
+            return Ok(None);
+        }
+        let column = RANGES.into_iter().find(|column| *column == self.range);
+        let column = column.ok_or_else(|| Error::invalid("range", self.range.as_str(), "a column from the list"))?;
+        let (from, to) = (end_of_range(column, "from", &self.from, -1.0)?, end_of_range(column, "to", &self.to, 1.0)?);
+        Ok(Some(ValueRange { column, from: from.unwrap_or(f64::MIN), to: to.unwrap_or(f64::MAX) }))
+    }
+
     /// The list that the cursors are about.
     fn list(&self, study: StudyId) -> ListFingerprint {
         let filter = [("sort", &self.sort), ("order", &self.order), ("state", &self.state), ("text", &self.text)];
-        let filter = filter.map(|(name, value)| (name.to_owned(), value.clone()));
-        ListFingerprint::of(&format!("/studies/{study}#trials"), &filter.to_vec())
+        let range = [("range", &self.range), ("from", &self.from), ("to", &self.to)];
+        let filter = filter.into_iter().chain(range).collect::<Vec<_>>();
+        let filter = filter.into_iter().map(|(name, value)| (name.to_owned(), value.clone()));
+        ListFingerprint::of(&format!("/studies/{study}#trials"), &filter.collect())
     }
 
     fn start(&self, list: &ListFingerprint) -> Result<ListStart, Error> {
@@ -96,6 +117,21 @@ impl TrialsQuery {
         let query = serde_urlencoded::to_string(self).map_err(|e| Error::Internal(e.to_string()))?;
         Ok(format!("?{query}#trials"))
     }
+}
+
+/// An end of a range in the unit of the record. Angles are shown with three digits, so an end stands for every angle that is shown as
+/// it: the range is wider by half a unit of the third digit, to lower angles if `direction` is -1, to greater ones if it is 1.
+fn end_of_range(column: &str, field: &str, text: &str, direction: f64) -> Result<Option<f64>, Error> {
+    let Some(value) = form_numbers::optional(field, text)? else { return Ok(None) };
+    if !value.is_finite() {
+        return Err(Error::invalid(field, text, "a finite number"));
+    }
+    let unit = TunedBounds::unit_of(column);
+    if bound_units::ANGLES.of(unit) == unit || value == 0.0 {
+        return Ok(Some(value));
+    }
+    let half_a_digit = 0.5 * 10_f64.powf(value.abs().log10().floor() - 2.0);
+    Ok(Some((value + direction * half_a_digit).to_radians()))
 }
 
 /// A column that sorts the table.
@@ -136,6 +172,8 @@ pub(super) struct TrialsTable {
     pub(super) any: bool,
     pub(super) choice: TrialsQuery,
     pub(super) states: Vec<StateChoice>,
+    /// The columns whose range can be chosen: name, label, whether it is chosen.
+    pub(super) ranges: Vec<(&'static str, String, bool)>,
     pub(super) values: Vec<Column>,
     pub(super) bounds: Vec<Column>,
     pub(super) rows: Vec<TrialRow>,
@@ -180,6 +218,7 @@ impl TrialsTable {
         Ok(Self {
             any: counts.total > 0,
             states: states(listing.state),
+            ranges: ranges(&choice),
             values: columns(&choice, &listing, false)?,
             bounds: columns(&choice, &listing, true)?,
             extent: (matching < counts.total || shown < matching)
@@ -199,6 +238,17 @@ fn states(chosen: Option<TrialState>) -> Vec<StateChoice> {
         chosen: chosen == Some(state),
     };
     TrialState::ALL.into_iter().map(choice).collect()
+}
+
+fn ranges(choice: &TrialsQuery) -> Vec<(&'static str, String, bool)> {
+    let range = |column: &'static str| {
+        let label = match heading(column) {
+            (label, meaning) if TunedBounds::NAMES.contains(&column) => format!("{label}: {meaning}"),
+            (label, _) => label.to_owned(),
+        };
+        (column, label, choice.range == column)
+    };
+    RANGES.into_iter().map(range).collect()
 }
 
 fn extent(shown: u32, before: u32, matching: u32, total: u32) -> String {

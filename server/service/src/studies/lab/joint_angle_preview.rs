@@ -1,13 +1,14 @@
 //! A preview of a recording of joint angles before it is stored: its angles over time, and the strides between right heel
 //! strikes, which are found from the joint angles.
 
-use super::file_format::{MeasurementFormat, WHAT};
+use super::file_format::MeasurementFormat;
+use super::joint_cycles::{WalkingLeg, strides};
 use super::upload::{JointAngleReading, NewJointAngles};
 use crate::error::Error;
 use crate::studies::angle_curves::ColumnChoice;
 use crate::studies::signal_extremes::extremes;
 use gait_optimizer::limit_cycle::JointRecording;
-use gait_optimizer::reference::{HeelStrikes, MotionRecording, RecordedStride};
+use gait_optimizer::reference::RecordedStride;
 
 /// A preview of a recording of joint angles.
 #[derive(Debug)]
@@ -34,7 +35,7 @@ impl NewJointAngles {
             let point = |(sample, angle): (usize, f64)| (sample as f64 / recording.rate_hz, angle.to_degrees());
             (*joint, extremes(angles).into_iter().map(point).collect())
         };
-        let (strikes_s, strides) = strides(&recording).unwrap_or_default();
+        let (strikes_s, strides) = strides(&recording, WalkingLeg::Right).unwrap_or_default();
         let refused = self.reading.faults(&self.recording);
         Ok(JointAnglePreview { traces: recording.joints.iter().map(trace).collect(), strikes_s, strides, refused })
     }
@@ -57,24 +58,6 @@ impl NewJointAngles {
             MeasurementFormat::Opensim => !JointRecording::has_names_of_opensim(&file),
         })
     }
-}
-
-/// Right heel strikes and the strides between them.
-fn strides(recording: &JointRecording) -> Option<(Vec<f64>, Vec<RecordedStride>)> {
-    let joint = |name: &str| recording.joints.iter().find(|(known, _)| *known == name).map(|(_, angles)| angles);
-    let (torso, hip, knee) = (joint("torso")?, joint("hip_R")?, joint("knee_R")?);
-    let motion = MotionRecording {
-        what: WHAT.to_owned(),
-        time_s: (0..knee.len()).map(|sample| sample as f64 / recording.rate_hz).collect(),
-        // The position of the right heel does not depend on the left leg.
-        angles_rad: torso.iter().zip(hip).map(|(torso, hip)| [*torso, 0.0, 0.0, 0.0, *hip]).collect(),
-        knee_r_rad: Some(knee.clone()),
-        right_force: None,
-        steps: Vec::new(),
-    };
-    let strikes = motion.heel_strikes(&HeelStrikes::Kinematics).ok()?;
-    let strides = motion.strides(&strikes);
-    Some((strikes, strides))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 use super::emg_reading::EmgReading;
 use super::file_format::WHAT;
+use super::joint_cycles::{JointCycle, joint_cycles};
 use super::session::still_shown;
 use super::session_view::gait_of;
 use super::upload::JointAngleReading;
@@ -187,6 +188,8 @@ pub struct LimitCycles {
     pub cutoff_hz: f64,
     /// Angle (rad) and velocity (rad/s) of each recorded joint, sample by sample.
     pub joints: Vec<LimitCycle>,
+    /// Each recorded joint over the cycle of its leg, as recorded; without the joints of a leg whose heel strikes cannot be found.
+    pub cycles: Vec<JointCycle>,
 }
 
 /// The limit cycles of the newest joint angles of each walk.
@@ -205,8 +208,9 @@ pub async fn limit_cycles(store: &mut Store, id: LabSessionId) -> Result<Vec<Lim
     let process = move |pool: &OnPool| {
         let cycles =
             |(walk, measurement_file_id, reading, file): (u8, MeasurementFileId, JointAngleReading, PackedText)| {
-                let joints = reading.limit_cycles(&file.text(pool)?)?;
-                Ok(LimitCycles { walk, measurement_file_id, cutoff_hz: reading.cutoff_hz, joints })
+                let text = file.text(pool)?;
+                let (joints, cycles) = (reading.limit_cycles(&text)?, joint_cycles(&reading.joints(&text)?));
+                Ok(LimitCycles { walk, measurement_file_id, cutoff_hz: reading.cutoff_hz, joints, cycles })
             };
         files.into_iter().map(cycles).collect()
     };

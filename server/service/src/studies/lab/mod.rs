@@ -13,6 +13,7 @@ mod emg_reading;
 mod file_format;
 mod foot_strikes;
 mod joint_angle_preview;
+mod joint_cycles;
 mod measurement_results;
 mod question;
 mod rejected_strides;
@@ -31,6 +32,7 @@ pub use emg_reading::EmgReading;
 pub use file_format::{C3D_FILE, MeasurementFormat, check_not_c3d};
 pub use foot_strikes::FootStrikes;
 pub use joint_angle_preview::JointAnglePreview;
+pub use joint_cycles::{JointCycle, WalkingLeg};
 pub use measurement_results::{
     EmgResult, LimitCycles, ProcessedEmg, WalkActivity, WalkModel, compute, emg, keep_result, known_gait, limit_cycles,
     with_model,

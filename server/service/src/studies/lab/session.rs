@@ -62,6 +62,7 @@ pub async fn gaits_to_plan_with(db: &mut Connection, study: StudyId, limit: u32)
         descending: false,
         state: Some(TrialState::Converged),
         contains: String::new(),
+        range: None,
         limit,
         start: ListStart::First,
     };
