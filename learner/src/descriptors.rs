@@ -32,7 +32,7 @@ impl ActionDescriptors {
     /// # Errors
     /// If there is no descriptor or more than 2,000, if their coordinates differ in number, are more than 1,000 or out of
     /// range, if an action has a descriptor that does not exist, or if the lengthscale is out of range.
-    pub fn new(of_action: Vec<Option<usize>>, descriptors: Vec<Vec<f64>>, lengthscale: f64) -> Result<Self> {
+    pub fn new(of_action: Vec<Option<usize>>, descriptors: &[Vec<f64>], lengthscale: f64) -> Result<Self> {
         let refuse = |descriptor: usize, reason: String| Err(LearnerError::InvalidDescriptor { descriptor, reason });
         let count = descriptors.len();
         if !(1..=MAX_DESCRIPTORS).contains(&count) {
@@ -59,7 +59,7 @@ impl ActionDescriptors {
         if !(lengthscale >= shortest && lengthscale <= longest) {
             return Err(LearnerError::InvalidDescriptorLengthscale { lengthscale, shortest, longest });
         }
-        let points = in_lengthscales(&descriptors, lengthscale);
+        let points = in_lengthscales(descriptors, lengthscale);
         let squared_distance =
             |i: usize, j: usize| points[i].iter().zip(&points[j]).map(|(a, b)| (a - b) * (a - b)).sum();
         Ok(Self { of_action, squared_distances: Square::from_fn(count, squared_distance) })
@@ -113,9 +113,9 @@ mod tests {
     #[test]
     fn invalid_descriptors_are_refused_with_their_place() {
         let refusal = |of: &[usize], descriptors: &[&[f64]], lengthscale| {
-            let descriptors = descriptors.iter().map(|point| point.to_vec()).collect();
+            let descriptors: Vec<Vec<f64>> = descriptors.iter().map(|point| point.to_vec()).collect();
             let of = of.iter().map(|of| Some(*of)).collect();
-            ActionDescriptors::new(of, descriptors, lengthscale).unwrap_err().to_string()
+            ActionDescriptors::new(of, &descriptors, lengthscale).unwrap_err().to_string()
         };
         let two: &[&[f64]] = &[&[0.0, 1.0], &[2.0, 3.0]];
         for (text, expected) in [

@@ -33,7 +33,7 @@ fn grid_described_by_its_values() -> SearchSpace {
     let squares = points.iter().flat_map(|point| point.iter().zip(means).map(|(x, mean)| (x - mean).powi(2)));
     let spread = (squares.sum::<f64>() / count).sqrt();
     let of_action = (0..points.len()).map(Some).collect();
-    let described = ActionDescriptors::new(of_action, points, 1.0 / spread).unwrap();
+    let described = ActionDescriptors::new(of_action, &points, 1.0 / spread).unwrap();
     space.described_by(described).unwrap()
 }
 
@@ -41,8 +41,8 @@ fn grid_described_by_its_values() -> SearchSpace {
 fn grid_with_equal_actions() -> (SearchSpace, Vec<Option<usize>>) {
     let of_action: Vec<Option<usize>> =
         (0..36).map(|action| Some((action * 7) % 12).filter(|descriptor| *descriptor < 10)).collect();
-    let points = (0..10).map(|i| vec![f64::from(i), f64::from(i * i % 7)]).collect();
-    let described = ActionDescriptors::new(of_action.clone(), points, 0.5).unwrap();
+    let points: Vec<Vec<f64>> = (0..10).map(|i| vec![f64::from(i), f64::from(i * i % 7)]).collect();
+    let described = ActionDescriptors::new(of_action.clone(), &points, 0.5).unwrap();
     (grid().described_by(described).unwrap(), of_action)
 }
 
@@ -173,7 +173,7 @@ fn nothing_follows_from_an_action_without_a_descriptor() {
 
 #[test]
 fn descriptors_of_another_number_of_actions_are_refused() {
-    let described = ActionDescriptors::new(vec![Some(0); 35], vec![vec![1.0]], 1.0).unwrap();
+    let described = ActionDescriptors::new(vec![Some(0); 35], &[vec![1.0]], 1.0).unwrap();
     let refusal = grid().described_by(described).unwrap_err();
     assert_eq!(refusal.to_string(), "the number of described actions is 35; it must be 36, the number of actions");
 }

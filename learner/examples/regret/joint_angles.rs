@@ -30,7 +30,7 @@ impl JointAngles {
     pub fn descriptors(&self, gaits: &[GaitOfAction], lengthscale: f64) -> Result<ActionDescriptors, String> {
         let places: BTreeMap<u32, usize> = self.0.keys().copied().zip(0..).collect();
         let of_action = gaits.iter().map(|gait| places.get(&gait.number).copied()).collect();
-        let descriptors = self.0.values().cloned().collect();
-        ActionDescriptors::new(of_action, descriptors, lengthscale).map_err(|error| error.to_string())
+        let descriptors: Vec<Vec<f64>> = self.0.values().cloned().collect();
+        ActionDescriptors::new(of_action, &descriptors, lengthscale).map_err(|error| error.to_string())
     }
 }
