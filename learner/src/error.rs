@@ -43,6 +43,42 @@ pub enum LearnerError {
         /// Upper limit, to three digits.
         longest: f64,
     },
+    /// There are no descriptors, or too many.
+    #[error("the number of descriptors is {given}; it must be 1 to {limit}")]
+    WrongDescriptorCount {
+        /// Number of descriptors given.
+        given: usize,
+        /// Largest number of descriptors allowed.
+        limit: usize,
+    },
+    /// A descriptor is malformed or does not exist.
+    #[error("descriptor {descriptor}: {reason}")]
+    InvalidDescriptor {
+        /// Index of the descriptor, counted from 0.
+        descriptor: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The lengthscale of the descriptors is out of range.
+    #[error(
+        "the lengthscale of the descriptors is {lengthscale}; it must be {shortest} to {longest}, in units of their spread"
+    )]
+    InvalidDescriptorLengthscale {
+        /// The lengthscale given.
+        lengthscale: f64,
+        /// Lower limit.
+        shortest: f64,
+        /// Upper limit.
+        longest: f64,
+    },
+    /// The number of described actions differs from that of the search space.
+    #[error("the number of described actions is {given}; it must be {expected}, the number of actions")]
+    WrongActionCount {
+        /// Number of actions described.
+        given: u64,
+        /// Number of actions in the space.
+        expected: u64,
+    },
     /// The grid has too many actions.
     #[error("the search space has more than {limit} actions, the largest number allowed")]
     TooManyActions {

@@ -79,6 +79,7 @@ impl<'a> ForbiddenActions<'a> {
     ) -> Self {
         let mut listed: HashSet<ActionIndex> = actions.into_iter().collect();
         let len = space.enumerable().ok();
+        listed.extend(same_outcome_or_none(space, &listed));
         listed.extend(len.into_iter().flat_map(|len| excluded.list(space, len)));
         let mut ascending: Vec<u64> = listed.iter().map(|action| action.0).collect();
         ascending.sort_unstable();
@@ -92,6 +93,14 @@ impl<'a> ForbiddenActions<'a> {
 
     fn is_in_box(&self, action: ActionIndex) -> bool {
         self.boxes.is_some_and(|boxes| boxes.contains(&self.space.levels(action)))
+    }
+
+    /// With descriptors, the first action outside of each.
+    pub(crate) fn one_of_each_descriptor(&self) -> Option<Vec<ActionIndex>> {
+        let descriptors = self.space.descriptors()?.of_actions();
+        let outside = (0..).map(ActionIndex).zip(descriptors).filter(|(action, _)| !self.contains(*action));
+        let mut seen = HashSet::new();
+        Some(outside.filter(|(_, of)| of.is_some() && seen.insert(**of)).map(|(action, _)| action).collect())
     }
 
     /// The listed actions.
@@ -117,6 +126,15 @@ impl<'a> ForbiddenActions<'a> {
         }
         ActionIndex(index)
     }
+}
+
+/// With descriptors, the actions that have that of one of these actions, and those that have none.
+fn same_outcome_or_none(space: &SearchSpace, actions: &HashSet<ActionIndex>) -> Vec<ActionIndex> {
+    let Some(descriptors) = space.descriptors().map(|descriptors| descriptors.of_actions()) else { return Vec::new() };
+    let place = |action: &ActionIndex| usize::try_from(action.0).ok();
+    let known: HashSet<usize> = actions.iter().filter_map(|action| *descriptors.get(place(action)?)?).collect();
+    let all = (0..).map(ActionIndex).zip(descriptors);
+    all.filter(|(_, of)| of.is_none_or(|of| known.contains(&of))).map(|(action, _)| action).collect()
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Exact joint samples of the utility of all actions.
 //!
 //! A sample of the prior is an array of normals times the Cholesky factor of each dimension's table (a Kronecker
-//! product). Matheron's rule then conditions the sample pathwise (Wilson et al. 2020): `f + k(x, V) K_VV^-1 (f_V -
+//! product), or of the descriptors' table. Matheron's rule then conditions the sample pathwise (Wilson et al. 2020): `f + k(x, V) K_VV^-1 (f_V -
 //! f(V) - e)`, with `f_V` a posterior sample at the points `V` and `e` a sample of the nugget.
 
 use crate::error::Result;
 use crate::gaussian_process::GaussianProcess;
+use crate::kernel::Correlations;
 use crate::linalg::Cholesky;
 use crate::random::Random;
 use crate::search_space::SearchSpace;
@@ -32,10 +33,16 @@ fn prior_sample(space: &SearchSpace, process: &GaussianProcess, random: &mut Ran
     let shape = space.shape();
     let kernel = &process.kernel;
     let scale = kernel.variance.sqrt();
+    let tables = match kernel.correlations() {
+        Correlations::Levels(tables) => tables,
+        Correlations::Descriptors(described) => {
+            return Ok(described.sample(random)?.into_iter().map(|value| scale * value).collect());
+        }
+    };
     let mut sample: Vec<f64> = (0..shape.iter().product()).map(|_| scale * random.normal()).collect();
-    for (d, &count) in shape.iter().enumerate() {
+    for (d, (&count, table)) in shape.iter().zip(tables).enumerate() {
         let stride = shape[d + 1..].iter().product();
-        along(&mut sample, count, stride, &Cholesky::new(&kernel.factor(d).ridged(1e-10))?);
+        along(&mut sample, count, stride, &Cholesky::new(&table.ridged(1e-10))?);
     }
     Ok(sample)
 }

@@ -42,6 +42,8 @@ mod acquisition;
 mod action;
 mod action_moments;
 mod comparisons;
+mod descriptor_correlations;
+mod descriptors;
 mod error;
 mod excluded;
 mod feedback;
@@ -68,6 +70,7 @@ pub use action::ActionIndex;
 pub use comparisons::{
     ComparisonReason, ProposedComparison, proposed_comparison, proposed_comparisons, proposed_comparisons_among,
 };
+pub use descriptors::ActionDescriptors;
 pub use error::LearnerError;
 pub use excluded::ExcludedActions;
 pub use feedback::{Feedback, FeedbackLog};

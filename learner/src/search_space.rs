@@ -1,8 +1,11 @@
 //! The search space: the grid of all combinations of the levels of its dimensions.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::action::ActionIndex;
+use crate::descriptors::ActionDescriptors;
 use crate::error::{LearnerError, Result};
 
 /// Largest number of actions: up to it, a JSON number represents every index exactly.
@@ -95,6 +98,7 @@ impl Dimension {
 pub struct SearchSpace {
     dimensions: Vec<Dimension>,
     len: u64,
+    descriptors: Option<Arc<ActionDescriptors>>,
 }
 
 /// Serialised form: the dimensions, from which the rest follows.
@@ -141,7 +145,26 @@ impl SearchSpace {
                 .filter(|&len| len <= MAX_ACTIONS)
                 .ok_or(LearnerError::TooManyActions { limit: MAX_ACTIONS })?;
         }
-        Ok(Self { dimensions, len })
+        Ok(Self { dimensions, len, descriptors: None })
+    }
+
+    /// The space with a descriptor of each action, in whose place the levels no longer say how alike two actions are. The
+    /// serialised form of a space lacks the descriptors.
+    ///
+    /// # Errors
+    /// If the number of actions differs, or is too large to evaluate all of them.
+    pub fn described_by(self, descriptors: ActionDescriptors) -> Result<Self> {
+        self.enumerable()?;
+        let (given, expected) = (descriptors.actions(), self.len);
+        if given != expected {
+            return Err(LearnerError::WrongActionCount { given, expected });
+        }
+        Ok(Self { descriptors: Some(Arc::new(descriptors)), ..self })
+    }
+
+    /// The descriptors of the actions, if they have some.
+    pub(crate) fn descriptors(&self) -> Option<&Arc<ActionDescriptors>> {
+        self.descriptors.as_ref()
     }
 
     /// The dimensions, in order.

@@ -41,8 +41,9 @@ impl Half {
 impl<'a> WholeGrid<'a> {
     pub(crate) fn new(space: &SearchSpace, process: &'a GaussianProcess) -> Self {
         let shape = space.shape();
-        // The cut that minimises the larger half.
-        let cut = (0..=shape.len())
+        // The cut that minimises the larger half. Correlations of descriptors have no halves: the right one is empty.
+        let least = if space.descriptors().is_some() { shape.len() } else { 0 };
+        let cut = (least..=shape.len())
             .min_by_key(|&cut| shape[..cut].iter().product::<usize>().max(shape[cut..].iter().product()))
             .unwrap_or(0);
         let left = Half::new(process, &shape, 0, cut, process.kernel.variance);

@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs, unreachable_pub, dead_code)]
 
+#[path = "../examples/regret/joint_angles.rs"]
+mod joint_angles;
 #[path = "../examples/regret/problems.rs"]
 mod problems;
 #[path = "../examples/regret/simulation.rs"]
@@ -13,7 +15,7 @@ mod table;
 use gait_learner::{LearnerSettings, Method};
 use problems::{Knowledge, Problem};
 use simulation::{Person, champion, run};
-use table::{DEFAULT_COLUMNS, Table};
+use table::{DEFAULT_COLUMNS, People, Table};
 
 const COMPARISONS: usize = 25;
 
@@ -62,7 +64,7 @@ fn eubo_beats_random_search_on_hartmann_3() {
 fn eubo_beats_random_search_on_the_gaits_of_an_atlas() {
     for (name, gaits) in [("atlas1", 254), ("atlas1m", 171)] {
         let table = Table::built_in(name, DEFAULT_COLUMNS).unwrap().unwrap();
-        let person = |seed| table.person(seed);
+        let person = |seed| table.person(People::LowResults, seed);
         let problem = person(40);
         assert!(problem.space.len() == 11_664 && problem.converged.iter().all(|converged| *converged), "{name}");
         let mut utilities: Vec<u64> = problem.utility.iter().map(|utility| utility.to_bits()).collect();
@@ -79,4 +81,25 @@ fn eubo_beats_random_search_on_the_gaits_of_an_atlas() {
         }
         assert!(eubo < random, "{name}: random {random} eubo {eubo}");
     }
+}
+
+#[test]
+fn descriptors_help_people_with_an_ideal_motion() {
+    let table = || Table::built_in("atlas1", DEFAULT_COLUMNS).unwrap().unwrap();
+    let (levels, joint_angles) = (table(), table().described_by_joint_angles(0.5).unwrap());
+    let settings = LearnerSettings::of(Method::Eubo);
+    let known = Knowledge { gaits: true, ..Knowledge::default() };
+    let mean = |table: &Table, knowledge| {
+        let last = |seed| {
+            let problem = table.person(People::IdealMotion, seed);
+            let regrets = run(Person::new(&problem, 0.0, seed), &settings, 15, 1, knowledge).unwrap();
+            *regrets.last().unwrap()
+        };
+        (40..52).map(last).sum::<f64>() / 12.0
+    };
+    let (of_levels, of_angles) = (mean(&levels, known), mean(&joint_angles, Knowledge::default()));
+    assert!(of_angles < 0.5 * of_levels, "levels {of_levels} joint angles {of_angles}");
+    // With muscles, the angles are not part of the project.
+    let with_muscles = Table::built_in("atlas1m", DEFAULT_COLUMNS).unwrap().unwrap();
+    assert!(with_muscles.described_by_joint_angles(0.5).is_err());
 }

@@ -12,10 +12,13 @@
 //! noisy feedback).
 //!
 //! `atlas1` and `atlas1m` are the gaits of subject 1 without and with muscles, and `--problem ATLAS.csv` reads another table of
-//! `gaitwright atlas`. Each seed is a person whose utility is a random mixture of the columns, of which low values are better.
+//! `gaitwright atlas`. Each seed is a person. `--people low_results` (default) have a utility that is a random mixture of the
+//! columns, of which low values are better; `ideal_results` want the columns, and `ideal_motion` the joint angles, near those
+//! of an ideal between two gaits.
 //!
 //! For these problems, `--known-gaits on` proposes no action with the gait of a visited one, as studies do, and
-//! `--inactive-bounds on` lets the learner ignore bounds that were active in no visited gait.
+//! `--inactive-bounds on` lets the learner ignore bounds that were active in no visited gait. With `--joint-angles L`,
+//! actions are as alike as the joint angles of their gaits, with lengthscale `L`, and each gait is proposed once.
 //!
 //! Writes rows `method,seed,k,regret`: regret after `k` comparisons, that is `k + 1` visited actions. Prints quartiles.
 //! Regret is 1 minus the utility of the recommended action. `--noise S` adds logistic noise of scale `S` to the
@@ -26,6 +29,7 @@
 
 #![allow(clippy::expect_used, unreachable_pub, missing_docs)]
 
+mod joint_angles;
 mod problems;
 mod simulation;
 mod summary;
@@ -39,7 +43,7 @@ use gait_learner::LearnerSettings;
 use problems::{Knowledge, Problem};
 use simulation::{Person, champion, run};
 use summary::{Curves, quantile, report};
-use table::{DEFAULT_COLUMNS, Table};
+use table::{DEFAULT_COLUMNS, People, Table};
 
 struct Options {
     problem: String,
@@ -49,6 +53,8 @@ struct Options {
     noise: f64,
     lengthscale: Option<f64>,
     columns: String,
+    people: People,
+    joint_angles: Option<f64>,
     batch: usize,
     knowledge: Knowledge,
     set: serde_json::Map<String, serde_json::Value>,
@@ -81,6 +87,8 @@ fn options() -> Result<Options, Box<dyn Error>> {
         noise: 0.0,
         lengthscale: None,
         columns: DEFAULT_COLUMNS.into(),
+        people: People::default(),
+        joint_angles: None,
         batch: 1,
         knowledge: Knowledge::default(),
         set: serde_json::Map::new(),
@@ -103,6 +111,8 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--noise" => options.noise = number(&name, &value, 0.0)?,
             "--lengthscale" => options.lengthscale = Some(number(&name, &value, 1e-6)?),
             "--columns" => options.columns = value,
+            "--people" => options.people = People::named(&value).ok_or_else(|| format!("unknown people {value}"))?,
+            "--joint-angles" => options.joint_angles = Some(number(&name, &value, 1e-6)?),
             "--batch" => options.batch = value.parse::<usize>()?.max(1),
             "--known-gaits" => options.knowledge.gaits = switch(&name, &value)?,
             "--inactive-bounds" => options.knowledge.inactive = switch(&name, &value)?,
@@ -110,6 +120,9 @@ fn options() -> Result<Options, Box<dyn Error>> {
             "--out" => options.out = Some(value),
             _ => return Err(format!("unknown option {name}").into()),
         }
+    }
+    if options.joint_angles.is_some() && options.knowledge.inactive {
+        return Err("--inactive-bounds: the learner knows no bounds with --joint-angles".into());
     }
     Ok(options)
 }
@@ -159,12 +172,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         None if is_table => Some(Table::read(path, &options.columns)),
         built_in => built_in,
     };
-    let table = table.transpose()?;
+    let table = match (table.transpose()?, options.joint_angles) {
+        (Some(table), Some(lengthscale)) => Some(table.described_by_joint_angles(lengthscale)?),
+        (None, Some(_)) => return Err("--joint-angles: the problem has no gaits".into()),
+        (table, None) => table,
+    };
     let start = Instant::now();
     let mut curves = Vec::new();
     for seed in options.seeds.clone() {
         let problem = match &table {
-            Some(table) => table.person(seed),
+            Some(table) => table.person(options.people, seed),
             None => Problem::named(&options.problem, seed, options.lengthscale).ok_or("unknown problem")?,
         };
         let person = Person::new(&problem, options.noise, seed);
@@ -180,7 +197,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         curves.push(regrets);
     }
     let seconds = start.elapsed().as_secs_f64();
-    for k in [10, 20, 30, 50, 75, 100].into_iter().filter(|&k| k <= options.comparisons) {
+    for k in [5, 10, 15, 20, 30, 50, 75, 100].into_iter().filter(|&k| k <= options.comparisons) {
         let mut at: Vec<f64> = curves.iter().map(|c| c[k]).collect();
         at.sort_by(f64::total_cmp);
         let mean = at.iter().sum::<f64>() / at.len() as f64;

@@ -1,23 +1,60 @@
 //! A benchmark problem from a table of results, such as that of `gaitwright atlas`: a row for each action of a grid, whose
-//! first columns are the values of the action. Each seed is a person, who prefers low values of some columns: the utility
-//! is a mixture of the columns with random weights.
+//! first columns are the values of the action. Each seed is a person, see [`People`].
 //!
 //! Two such tables are part of the project; `atlases/README.md` says how they are made.
 
+use crate::joint_angles::JointAngles;
 use crate::problems::{GaitOfAction, Problem, SplitMix64};
 use gait_learner::{Dimension, SearchSpace};
 use std::path::Path;
 use std::rc::Rc;
 
-/// Name and content of each built-in table: the atlas of subject 1, without and with muscles.
-const BUILT_IN: [(&str, &[u8]); 2] =
-    [("atlas1", include_bytes!("atlases/atlas1.csv.zst")), ("atlas1m", include_bytes!("atlases/atlas1m.csv.zst"))];
+/// A built-in table.
+struct BuiltIn {
+    name: &'static str,
+    table: &'static [u8],
+    joint_angles: Option<&'static [u8]>,
+}
+
+/// The atlas of subject 1, without and with muscles.
+const BUILT_IN: [BuiltIn; 2] = [
+    BuiltIn {
+        name: "atlas1",
+        table: include_bytes!("atlases/atlas1.csv.zst"),
+        joint_angles: Some(include_bytes!("atlases/atlas1.angles.csv.zst")),
+    },
+    BuiltIn { name: "atlas1m", table: include_bytes!("atlases/atlas1m.csv.zst"), joint_angles: None },
+];
 
 /// Columns of a built-in table that people care about, if none are named.
 pub const DEFAULT_COLUMNS: &str = "gait_rmse_other_rad,peak_hip_torque_nm_kg,step_time_asymmetry,cost_of_transport";
 
 /// Number of leading columns that are the values of an action.
 const DIMENSIONS: usize = 8;
+
+/// What people care about.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub enum People {
+    /// Low values of the columns: the utility is a mixture with random weights.
+    #[default]
+    LowResults,
+    /// Columns near those of an ideal, a blend of two random gaits, with random weights.
+    IdealResults,
+    /// Joint angles near those of an ideal, a blend of two random gaits.
+    IdealMotion,
+}
+
+impl People {
+    /// The people of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "low_results" => Some(Self::LowResults),
+            "ideal_results" => Some(Self::IdealResults),
+            "ideal_motion" => Some(Self::IdealMotion),
+            _ => None,
+        }
+    }
+}
 
 /// The table, with the columns that people care about.
 pub struct Table {
@@ -26,15 +63,22 @@ pub struct Table {
     merits: Vec<Option<Vec<f64>>>,
     /// The gait of each action, if the table numbers them.
     gaits: Option<Rc<Vec<GaitOfAction>>>,
+    joint_angles: Option<JointAngles>,
 }
 
 impl Table {
     /// The built-in table of this name; `None` if there is none.
     pub fn built_in(name: &str, columns: &str) -> Option<Result<Self, String>> {
-        let (_, packed) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-        let unpacked = zstd::decode_all(*packed).map_err(|error| error.to_string());
-        let text = unpacked.and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
-        Some(text.and_then(|text| Self::parse(&text, columns)))
+        let built_in = BUILT_IN.iter().find(|built_in| built_in.name == name)?;
+        let unpacked = |packed: &[u8]| {
+            let bytes = zstd::decode_all(packed).map_err(|error| error.to_string())?;
+            String::from_utf8(bytes).map_err(|error| error.to_string())
+        };
+        Some((|| {
+            let joint_angles =
+                built_in.joint_angles.map(|packed| JointAngles::parse(&unpacked(packed)?)).transpose()?;
+            Ok(Self { joint_angles, ..Self::parse(&unpacked(built_in.table)?, columns)? })
+        })())
     }
 
     /// Reads the file. `columns` are the names of the columns of which low values are better, separated by commas.
@@ -105,20 +149,38 @@ impl Table {
             }
             merits[index] = row.map(scaled);
         }
-        Ok(Self { space, merits, gaits: numbered.map(|_| Rc::new(gaits)) })
+        Ok(Self { space, merits, gaits: numbered.map(|_| Rc::new(gaits)), joint_angles: None })
+    }
+
+    /// The same table, for a learner to which actions are as alike as the joint angles of their gaits.
+    pub fn described_by_joint_angles(self, lengthscale: f64) -> Result<Self, String> {
+        let known = self.joint_angles.as_ref().zip(self.gaits.as_ref());
+        let (angles, gaits) = known.ok_or("the table has no joint angles")?;
+        let described = self.space.described_by(angles.descriptors(gaits, lengthscale)?);
+        Ok(Self { space: described.map_err(|error| error.to_string())?, ..self })
     }
 
     /// The problem of one person.
-    pub fn person(&self, seed: u64) -> Problem {
+    pub fn person(&self, people: People, seed: u64) -> Problem {
         let mut random = SplitMix64(seed.wrapping_mul(1_000_003).wrapping_add(29));
         let columns = self.merits.iter().flatten().next().map_or(0, Vec::len);
         // Uniform on the simplex of weights.
         let weights: Vec<f64> = (0..columns).map(|_| -(1.0 - random.unit()).ln()).collect();
-        let mixed: Vec<Option<f64>> = self
-            .merits
-            .iter()
-            .map(|merits| Some(merits.as_ref()?.iter().zip(&weights).map(|(merit, weight)| merit * weight).sum()))
-            .collect();
+        let mixed: Vec<Option<f64>> = match people {
+            People::LowResults => self
+                .merits
+                .iter()
+                .map(|merits| Some(merits.as_ref()?.iter().zip(&weights).map(|(merit, weight)| merit * weight).sum()))
+                .collect(),
+            People::IdealResults => nearness_to_ideal(&self.merits, &weights, &mut random),
+            People::IdealMotion => {
+                let angles = |gait: &GaitOfAction| Some(self.joint_angles.as_ref()?.of(gait)?.to_vec());
+                let angles: Vec<Option<Vec<f64>>> =
+                    self.gaits.iter().flat_map(|gaits| gaits.iter().map(angles)).collect();
+                let count = angles.iter().flatten().next().map_or(0, Vec::len);
+                nearness_to_ideal(&angles, &vec![1.0; count], &mut random)
+            }
+        };
         let (low, high) = range(mixed.iter().flatten().copied());
         let utility = mixed.iter().map(|mixed| mixed.map_or(0.0, |mixed| (mixed - low) / (high - low).max(1e-12)));
         Problem {
@@ -128,6 +190,19 @@ impl Table {
             gaits: self.gaits.clone(),
         }
     }
+}
+
+/// Negative distance of each action's point from a blend of the points of two random actions.
+fn nearness_to_ideal(points: &[Option<Vec<f64>>], weights: &[f64], random: &mut SplitMix64) -> Vec<Option<f64>> {
+    let known: Vec<&Vec<f64>> = points.iter().flatten().collect();
+    let [one, other] = [random.below(known.len()), random.below(known.len())].map(|place| known[place]);
+    let share = random.unit();
+    let ideal: Vec<f64> = one.iter().zip(other).map(|(a, b)| share * a + (1.0 - share) * b).collect();
+    let nearness = |point: &Vec<f64>| {
+        let squares = point.iter().zip(&ideal).zip(weights).map(|((x, ideal), weight)| weight * (x - ideal).powi(2));
+        -squares.sum::<f64>().sqrt()
+    };
+    points.iter().map(|point| point.as_ref().map(nearness)).collect()
 }
 
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {

@@ -32,12 +32,13 @@ pub(crate) fn against(
     pending: &[ActionIndex],
     among: Option<&[ActionIndex]>,
 ) -> Option<ActionIndex> {
+    // Actions with one descriptor have one expected utility.
+    let representatives = if among.is_none() { forbidden.one_of_each_descriptor() } else { None };
+    let among = among.or(representatives.as_deref());
     // The caller passes `among` if the grid is too large to enumerate.
-    let set = match (posterior.space().enumerable(), among) {
-        (Ok(len), _) => ActionSet::Grid(len),
-        (Err(_), among) => {
-            ActionSet::list(among.into_iter().flatten().chain(pending).chain([&best]).copied().collect())
-        }
+    let set = match posterior.space().enumerable() {
+        Ok(len) if posterior.space().descriptors().is_none() => ActionSet::Grid(len),
+        _ => ActionSet::list(among.into_iter().flatten().chain(pending).chain([&best]).copied().collect()),
     };
     let avoidance = Avoidance::of(posterior);
     let found = maximiser(posterior, &set, best, forbidden, pending, among, avoidance.as_ref());

@@ -34,6 +34,9 @@ pub(super) struct AtlasCommand {
     /// this file (JSON), as `solve --out` does.
     #[arg(long, value_name = "FILE.json")]
     best: Option<PathBuf>,
+    /// When the atlas is complete, write the joint angles of each different gait to this file.
+    #[arg(long, value_name = "FILE.csv")]
+    joint_angles: Option<PathBuf>,
     /// Number of solves that run in parallel (default: number of cores). The result does not depend on it.
     #[arg(long, value_name = "NUMBER", value_parser = workers, allow_negative_numbers = true)]
     workers: Option<usize>,
@@ -47,6 +50,8 @@ impl AtlasCommand {
         let cancel = cancelled_by_signal();
         let mut out = OutFile::open(&self.out, &self.flags.inputs())?;
         let best = self.best.as_deref().map(|best| OutFile::open(best, &self.flags.inputs())).transpose()?;
+        let angles = self.joint_angles.as_deref();
+        let angles = angles.map(|path| OutFile::open(path, &self.flags.inputs())).transpose()?;
         let stopped = cancel.clone();
         let progress_path = progress_path(&self.out);
         let workers = cores_or(self.workers);
@@ -70,6 +75,9 @@ impl AtlasCommand {
         let path = out.path().display().to_string();
         out.finish()?;
         tell(&format!("{}; written to {path}", finished.map.in_words()));
+        if let Some(file) = angles {
+            file.write(&atlas_table::joint_angles(&finished.map))?;
+        }
         let finished = match best {
             None => finished,
             Some(file) => {

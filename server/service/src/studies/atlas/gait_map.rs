@@ -1,10 +1,12 @@
 //! The solves of an atlas, and the row of each action.
 
 use super::action_map::ActionMap;
+use super::gait_values::GaitValues;
 use super::solved_action::SolvedAction;
 use crate::studies::bound_grid;
 use gait_learner::{ActionIndex, SearchSpace};
 use gait_optimizer::{ModelError, TunedBounds};
+use std::collections::BTreeMap;
 
 /// The solves so far, and the solve of each action.
 #[derive(Debug)]
@@ -34,6 +36,11 @@ impl GaitMap {
             let values = self.actions.space().values(action);
             AtlasRow { values, number: numbers[place], solved: &self.solves[place] }
         })
+    }
+
+    /// Each different gait, by its number.
+    pub fn gaits(&self) -> BTreeMap<u32, &GaitValues> {
+        self.rows().filter_map(|row| Some((row.number?, row.solved.gait.as_ref()?))).collect()
     }
 
     /// Number of actions.
@@ -81,7 +88,6 @@ pub struct AtlasRow<'a> {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::gait_values::GaitValues;
     use super::*;
     use gait_optimizer::{SolveStatus, UnchangedBound};
 
@@ -101,6 +107,7 @@ pub(super) mod tests {
             double_support_percent: 0.0,
             step_time_asymmetry: 0.0,
             peak_hip_torque_nm_kg: 0.0,
+            joint_angles_rad: Vec::new(),
             unchanged_bounds: bounds.collect(),
         };
         let status = if converged { SolveStatus::Converged } else { SolveStatus::Stalled };
@@ -139,6 +146,8 @@ pub(super) mod tests {
             [0, 1, 2, 5].map(|action| atlas.actions.place_of(ActionIndex(action))),
             [Some(2), Some(2), Some(2), Some(0)]
         );
+        // The solve without a gait has no number.
+        assert_eq!(atlas.gaits().into_keys().collect::<Vec<_>>(), [1, 2]);
         atlas.add(solved(&space, 2, &[], false));
         assert_eq!(atlas.actions.place_of(ActionIndex(2)), Some(2));
     }

@@ -5,6 +5,9 @@ use gait_optimizer::spatiotemporal::Spatiotemporal;
 use gait_optimizer::{Gait, ModelError, ReferenceGait, SolveReport, UnchangedBound};
 use serde::{Deserialize, Serialize};
 
+/// Number of times of the stride at which the joint angles are kept.
+const TIMES: usize = 10;
+
 /// The values of a gait.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GaitValues {
@@ -26,6 +29,8 @@ pub struct GaitValues {
     pub step_time_asymmetry: f64,
     /// Largest torque of either hip per body mass, N m/kg.
     pub peak_hip_torque_nm_kg: f64,
+    /// Torso, hip, knee and ankle of the left leg, then of the right one, rad, at 0, 10, ..., 90 % of the stride.
+    pub joint_angles_rad: Vec<[f64; 7]>,
     /// Values of each tuned bound that leave the gait as it is.
     pub unchanged_bounds: Vec<UnchangedBound>,
 }
@@ -63,6 +68,7 @@ impl GaitValues {
             double_support_percent: spatiotemporal.double_support_percent,
             step_time_asymmetry: 2.0 * (left - right).abs() / (left + right),
             peak_hip_torque_nm_kg: peak_hip_torque(gait) / gait.subject.body_mass_kg,
+            joint_angles_rad: joint_angles(gait),
             unchanged_bounds: report.unchanged_bounds.clone(),
         })
     }
@@ -92,6 +98,11 @@ impl GaitValues {
 pub(super) fn active_bounds(unchanged: &[UnchangedBound]) -> Vec<&str> {
     let active = unchanged.iter().filter(|bound| bound.least.is_some() && bound.least == bound.most);
     active.map(|bound| bound.bound.as_str()).collect()
+}
+
+fn joint_angles(gait: &Gait) -> Vec<[f64; 7]> {
+    let angles = |[_, _, angles @ ..]: [f64; 9]| angles;
+    (0..TIMES).map(|time| angles(gait.coordinates_at(time as f64 / TIMES as f64 * gait.stride_time_s))).collect()
 }
 
 /// Largest torque of either hip at the nodes, N m.
