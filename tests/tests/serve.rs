@@ -7,8 +7,9 @@ use gaitwright_service::access::user_administration::{self, NewUser};
 use gaitwright_store::audit::Actor;
 use gaitwright_store::{Store, commit};
 use gaitwright_tests::cli::run;
-use gaitwright_tests::client::{get, send};
+use gaitwright_tests::client::{get, post, send};
 use gaitwright_tests::serve_process::Process;
+use serde_json::json;
 use skipped_tests::skipped;
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -66,6 +67,41 @@ fn connections_without_a_complete_request_are_closed() {
     let cut_off = [silent(""), silent("GET / HTTP/1.1\r\nhost: localhost\r\n")].map(|one| one.join().unwrap());
     assert_eq!(cut_off, [true, true]);
     assert_eq!(get(process.address(), "/health").unwrap().status, 200);
+}
+
+#[cfg(unix)]
+#[test]
+fn notify_program_runs_with_the_study_and_its_state() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("notify");
+    std::fs::write(&program, "#!/bin/sh\necho \"$1 $2 $GAITWRIGHT_LOG_FORMAT.\" >> notices\n").unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut command = Command::new(BINARY);
+    command.args(["serve", "--listen", "127.0.0.1:0", "--no-sign-in", "--notify-program", "notify"]);
+    command.env("GAITWRIGHT_LOG_FORMAT", "text").current_dir(folder.path());
+    let process = Process::watch(command, "listening on ");
+    let subjects = get(process.address(), "/api/v1/subjects").unwrap().items();
+    let body = json!({ "subject_id": subjects[0]["id"], "start": false });
+    let study = post(process.address(), "/api/v1/studies", &body).unwrap().json();
+    let study = study["id"].as_str().unwrap();
+    let stopped = send(process.address(), "POST", &format!("/api/v1/studies/{study}/stop"), "").unwrap();
+    assert_eq!(stopped.status, 200, "{}", stopped.body);
+    let notices = || std::fs::read_to_string(folder.path().join("notices")).unwrap_or_default();
+    assert!((0..600).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        !notices().is_empty()
+    }));
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(notices(), format!("{study} stopped .\n"));
+
+    let missing = run(BINARY, folder.path(), &["serve", "--no-sign-in", "--notify-program", "missing"]);
+    assert_eq!(missing.status.code(), Some(2));
+    let text = String::from_utf8_lossy(&missing.stderr);
+    assert!(
+        text.contains("notify_program (flag) is \"missing\"; it must be the path of an existing program"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -16,5 +16,6 @@ pub mod json_document;
 pub mod printable;
 pub mod scheduled_backups;
 pub mod studies;
+pub mod study_notices;
 pub mod supervise;
 pub mod workers;

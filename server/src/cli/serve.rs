@@ -17,6 +17,7 @@ use gaitwright_service::expired_data;
 use gaitwright_service::scheduled_backups::ClaimedPlan;
 use gaitwright_service::studies::built_in_entries;
 use gaitwright_service::studies::scheduler::Scheduler;
+use gaitwright_service::study_notices;
 use gaitwright_service::workers::{AfterSolves, Dispatch, GaitSolver, InProcess};
 #[cfg(feature = "nats")]
 use gaitwright_service::workers::{LEASE, nats::JetStream};
@@ -25,6 +26,7 @@ use gaitwright_store::{Store, commit};
 use hyper_util::rt::{TokioExecutor, TokioTimer};
 use hyper_util::server::conn::auto::Builder;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -93,7 +95,13 @@ impl ServeCommand {
             let scheduler = scheduler.clone();
             async move { Box::pin(scheduler.run()).await }
         });
-        let chores = tokio::spawn(run_maintenance(scheduler.clone(), store.clone(), plan.access_log_days, backups));
+        let chores = tokio::spawn(run_maintenance(
+            scheduler.clone(),
+            store.clone(),
+            plan.access_log_days,
+            backups,
+            plan.notify_program.clone(),
+        ));
         tracing::info!(database = %database.display(), workers = scheduler.workers(), "listening on {origin}");
         if !plan.listen.ip().is_loopback() && scheme == "http" && !proxies.are_any() {
             tracing::warn!("no TLS: passwords and sign-in links cross the network unencrypted");
@@ -158,13 +166,14 @@ fn cut_off_silence(http: &mut Builder<TokioExecutor>) {
     http.http1().timer(TokioTimer::new()).header_read_timeout(REQUEST_HEAD_TIMEOUT);
 }
 
-/// Runs the housekeeping tasks until the scheduler stops: deletes expired data and makes backups. Failures are logged
-/// and retried. A task that panics is restarted, and `/ready` reports it.
+/// Runs the housekeeping tasks until the scheduler stops: deletes expired data, makes backups and gives notices of studies.
+/// Failures are logged and retried. A task that panics is restarted, and `/ready` reports it.
 async fn run_maintenance(
     scheduler: Scheduler,
     store: Store,
     access_log_days: Option<u32>,
     backups: Option<ClaimedPlan>,
+    notify_program: Option<PathBuf>,
 ) {
     let dropping =
         scheduler.keep("deleting expired data", |task| expired_data::delete_expired_hourly(store.clone(), task));
@@ -178,5 +187,11 @@ async fn run_maintenance(
             scheduler.keep("backing up the record", |task| plan.clone().follow(store.clone(), task)).await;
         }
     };
-    tokio::join!(dropping, pruning, copying);
+    let notifying = async {
+        if let Some(program) = notify_program {
+            let begin = |task| study_notices::give_notices(store.clone(), program.clone(), task);
+            scheduler.keep("notices of studies", begin).await;
+        }
+    };
+    tokio::join!(dropping, pruning, copying, notifying);
 }

@@ -28,6 +28,7 @@ pub(super) struct ServicePlan {
     pub(super) access_log_days: Option<u32>,
     pub(super) backups: Option<BackupPlan>,
     pub(super) reserve_bytes: u64,
+    pub(super) notify_program: Option<PathBuf>,
     /// The broker and the name of the service on it.
     #[cfg_attr(not(feature = "nats"), allow(dead_code, reason = "always `None`"))]
     pub(super) nats: Option<(String, String)>,
@@ -48,6 +49,7 @@ impl ServicePlan {
             access_log_days: settings.access_log_days()?,
             backups: settings.backups()?,
             reserve_bytes: settings.reserve_bytes()?,
+            notify_program: settings.notify_program()?,
             nats: settings.nats()?.map(|(url, queue)| (url.to_owned(), queue.to_owned())),
         };
         plan.refuse_strangers(settings)?;

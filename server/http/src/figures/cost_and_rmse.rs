@@ -9,9 +9,8 @@ use gaitwright_store::trials::{Trial, TrialState};
 /// Cost of transport against Gait RMSE of the newest converged trials and of the recommended one; `None` without a trial that has
 /// both values.
 pub(crate) fn cost_and_rmse(snapshot: &StudySnapshot, recommended: Option<TrialId>) -> Option<Figure> {
-    let place = |trial: &Trial| trial.gait_rmse_rad.zip(trial.cost_of_transport);
     let point = |trial: &Trial| {
-        let (rmse, cost) = place(trial)?;
+        let (rmse, cost) = trial.gait_rmse_rad.zip(trial.cost_of_transport)?;
         let name = format!("trial {}: Gait RMSE {rmse:.4} rad, cost of transport {cost:.4}", trial.number);
         Some(((rmse, cost), PointLink { address: format!("/trials/{}", trial.id), name }))
     };
@@ -20,9 +19,8 @@ pub(crate) fn cost_and_rmse(snapshot: &StudySnapshot, recommended: Option<TrialI
     let best = recommended.and_then(|id| snapshot.trial(id));
     let mut chart = Chart::new("Cost of transport and Gait RMSE", "Gait RMSE, rad", "cost of transport");
     chart = chart.with_links("trial", 0, others);
-    if let Some((best, (rmse, _))) = best.and_then(|best| Some((point(best)?, place(best)?))) {
+    if let Some(best) = best.and_then(point) {
         chart = chart.with_links("recommended", 1, vec![best]);
-        chart.marks.push((rmse, "Gait RMSE of the recommended trial".to_owned()));
     }
     (!chart.legend().is_empty()).then(|| Figure::chart("", chart))
 }

@@ -89,6 +89,10 @@ pub(in crate::cli) struct Flags {
     /// PEM file with the private key.
     #[arg(long, value_name = "FILE")]
     pub(super) tls_key: Option<String>,
+    /// Program that runs as `PROGRAM STUDY STATE` when a study finishes, stops or pauses, or has waited for an answer for a
+    /// minute (default: none).
+    #[arg(long, value_name = "PROGRAM")]
+    pub(super) notify_program: Option<String>,
 }
 
 impl Flags {
@@ -116,6 +120,7 @@ impl Flags {
             "proxy_headers" => self.proxy_headers.clone(),
             "tls_certificate" => self.tls_certificate.clone(),
             "tls_key" => self.tls_key.clone(),
+            "notify_program" => self.notify_program.clone(),
             _ => None,
         }
     }

@@ -27,6 +27,11 @@ pub(super) const KNOWN: &[(&str, &str, &str)] = &[
     ("connections_per_address", "100", "maximum number of connections from one address; trusted proxies are exempt"),
     ("access_log_days", "0", "days for which rows of the access log are kept; 0: forever"),
     ("reserve_mb", "500", "free disk space, MB, below which no new study or solve starts"),
+    (
+        "notify_program",
+        "",
+        "program to run as PROGRAM STUDY STATE when a study finishes, stops, pauses or waits for an answer; empty: none",
+    ),
     ("log", "warn,gaitwright=info", "log filter, as in RUST_LOG"),
     ("log_format", "text", "log format: text or json"),
 ];

@@ -43,6 +43,16 @@ impl Settings {
         Store::open_anchored(&self.database(), self.anchor().as_deref()).await
     }
 
+    /// The program for notices of studies, if any.
+    pub(in crate::cli) fn notify_program(&self) -> Result<Option<PathBuf>, Error> {
+        let program = PathBuf::from(self.text("notify_program"));
+        match std::path::absolute(&program) {
+            _ if program.as_os_str().is_empty() => Ok(None),
+            Ok(program) if program.is_file() => Ok(Some(program)),
+            _ => Err(self.refused("notify_program", "the path of an existing program")),
+        }
+    }
+
     /// Scheduled backups, if any.
     pub(in crate::cli) fn backups(&self) -> Result<Option<BackupPlan>, Error> {
         let hours: u64 = self.parsed("backup_hours", "1 to 8760")?;

@@ -4,6 +4,7 @@ use super::{Study, StudyState, from_row};
 use crate::accessible_studies::Reach;
 use crate::accessible_studies::{reach_values, reached};
 use crate::{Connection, Instant, StoreResult, StudyId, SubjectId};
+use sqlx::Row;
 
 /// A column by which studies can be sorted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -59,6 +60,15 @@ impl StudyFilter {
     pub fn newest(limit: u32) -> Self {
         Self { limit, ..Self::default() }
     }
+}
+
+/// The state of every study.
+///
+/// # Errors
+/// Errors of the database.
+pub async fn states(db: &mut Connection) -> StoreResult<Vec<(StudyId, StudyState)>> {
+    let rows = sqlx::query("select id, state from studies").fetch_all(db).await?;
+    rows.iter().map(|row| Ok((row.try_get("id")?, row.try_get::<&str, _>("state")?.parse()?))).collect()
 }
 
 /// Studies that a caller reaches.

@@ -9,7 +9,7 @@ mod study_state;
 pub use atlases::finished_atlas;
 pub use lists::{
     StudyColumn, StudyFilter, active, awaiting_raters, ended_before, names, of_subject, of_subject_with_safety_reports,
-    open_of, page, tags, waiting_for_people, with_safety_reports,
+    open_of, page, states, tags, waiting_for_people, with_safety_reports,
 };
 pub use plan::{AnswerSource, AtlasRole, Evaluation, StudyPlan, WarmStartFrom};
 pub use simulated_walks::{SimulatedWalks, SimulatedWalksEffect};
