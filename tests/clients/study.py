@@ -61,7 +61,7 @@ from gaitwright_client.types import UNSET, File, Response, Unset
 
 TRIALS = 10
 SECONDS = 60
-FIGURE = "course-gait-rmse-of-the-best-action-by-iteration"
+FIGURE = "progress-gait-rmse-of-the-best-action-by-iteration"
 
 ARCHIVE = b"gaitwright study"
 

@@ -14,7 +14,7 @@ type Reply<T> = { data?: T; error?: { detail: string }; response: Response };
 
 const TRIALS = 10;
 const SECONDS = 60;
-const FIGURE = "course-gait-rmse-of-the-best-action-by-iteration";
+const FIGURE = "progress-gait-rmse-of-the-best-action-by-iteration";
 const address = process.argv[2];
 // The service runs without sign-in, so requests without a token have all rights. Scripts normally send a token.
 const administrator = createClient<paths>({ baseUrl: address });

@@ -93,8 +93,8 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
             }
         }
     }
-    let course = format!("/api/v1/studies/{}/figures/course-gait-rmse-of-the-best-action-by-iteration.csv", studies[0]);
-    let (_, csv) = file(&service, &course).await;
+    let progress = format!("/api/v1/studies/{}/figures/progress-gait-rmse-of-the-best-action-by-iteration.csv", studies[0]);
+    let (_, csv) = file(&service, &progress).await;
     let history = service.fetch(&format!("/api/v1/studies/{}/history", studies[0])).await.items();
     let csv = String::from_utf8(csv).unwrap();
     let milestones: Vec<_> =
@@ -109,7 +109,7 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
     let row = format!("a5,at least,{},m,swing-foot clearance,passed\n", best["bounds"]["a5"]);
     let header = "bound,side,value,unit,limits,certificate_of_the_gait\n";
     assert!(bounds.text.starts_with(header) && bounds.text.contains(&row), "{}", bounds.text);
-    for unknown in ["nothing.svg", "course.gif", "course", "..%2Fa.svg"] {
+    for unknown in ["nothing.svg", "progress.gif", "progress", "..%2Fa.svg"] {
         let path = format!("/api/v1/studies/{}/figures/{unknown}", studies[0]);
         assert_eq!(service.fetch(&path).await.status, StatusCode::NOT_FOUND, "{unknown}");
     }

@@ -18,14 +18,14 @@ use utoipa::ToSchema;
 pub struct Instant(jiff::Timestamp);
 
 /// The clock of this process, in milliseconds.
-struct Course {
+struct ClockState {
     /// An instant, and the steady time at which it was current.
     anchor: (i64, Steady),
     /// The latest instant that was given.
     latest: i64,
 }
 
-impl Course {
+impl ClockState {
     /// Starts at the machine's clock.
     fn start(machine: i64) -> Self {
         Self { anchor: (machine, Steady::now()), latest: machine.saturating_sub(1) }
@@ -38,7 +38,7 @@ impl Course {
     }
 }
 
-static COURSE: Mutex<Option<Course>> = Mutex::new(None);
+static CLOCK: Mutex<Option<ClockState>> = Mutex::new(None);
 /// What [`set_machine_clock`] adds to the clock of the machine, in milliseconds.
 static SET_BY_MS: AtomicI64 = AtomicI64::new(0);
 
@@ -51,24 +51,24 @@ fn machine_ms() -> i64 {
 /// even if the machine's clock is set back or that of another machine was ahead. Time passes all the same.
 pub fn now() -> Instant {
     let machine = machine_ms();
-    let mut course = COURSE.lock().unwrap_or_else(PoisonError::into_inner);
-    let course = course.get_or_insert_with(|| Course::start(machine));
-    let passed = course.passed();
+    let mut clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
+    let clock = clock.get_or_insert_with(|| ClockState::start(machine));
+    let passed = clock.passed();
     if machine > passed {
-        course.anchor = (machine, Steady::now());
+        clock.anchor = (machine, Steady::now());
     }
-    course.latest = machine.max(passed).max(course.latest.saturating_add(1));
-    Instant(jiff::Timestamp::from_millisecond(course.latest).unwrap_or(jiff::Timestamp::MAX))
+    clock.latest = machine.max(passed).max(clock.latest.saturating_add(1));
+    Instant(jiff::Timestamp::from_millisecond(clock.latest).unwrap_or(jiff::Timestamp::MAX))
 }
 
 /// Makes every later [`now`] later than an instant.
 pub(crate) fn never_before(instant: Instant) {
     let least = instant.0.as_millisecond();
-    let mut course = COURSE.lock().unwrap_or_else(PoisonError::into_inner);
-    let course = course.get_or_insert_with(|| Course::start(machine_ms()));
-    if course.latest < least {
-        course.anchor = (course.passed().max(least), Steady::now());
-        course.latest = least;
+    let mut clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
+    let clock = clock.get_or_insert_with(|| ClockState::start(machine_ms()));
+    if clock.latest < least {
+        clock.anchor = (clock.passed().max(least), Steady::now());
+        clock.latest = least;
     }
 }
 

@@ -158,7 +158,7 @@ async fn browser_leads_with_the_comparison_that_waits_and_draws_the_utility_over
         (page.count(&format!("{chart} .band")).await, page.count("[data-part=history] svg.chart").await),
         (1, 1)
     );
-    assert_eq!(page.count("[data-part=course] svg.chart").await, 1);
+    assert_eq!(page.count("[data-part=progress] svg.chart").await, 1);
     // The same figures as on the page Analysis.
     let sentence = "document.querySelector('[data-part=best] table').previousElementSibling.textContent.match(/\\d+\\s%/)?.[0].replace(/\\s/, ' ')";
     let sure = page.value(sentence).await;

@@ -18,6 +18,6 @@ mod utility;
 
 pub(crate) use cost_and_rmse::cost_and_rmse;
 pub(crate) use outcome::StudyOutcome;
-pub(crate) use study_progress::{COURSE, course, warm_starts};
+pub(crate) use study_progress::{PROGRESS, progress_chart, warm_starts};
 pub(crate) use study_results::{MAX_IN_A_CHART, StudyResults, have_one_reference_gait};
 pub(crate) use utility::utility;

@@ -64,7 +64,7 @@ impl StudyOutcome {
     }
 
     /// Gait RMSE of the best action by iteration.
-    pub(crate) fn course(&self) -> Vec<(f64, f64)> {
+    pub(crate) fn progress(&self) -> Vec<(f64, f64)> {
         let point = |milestone: &HistoryEntry| Some((f64::from(milestone.iteration), milestone.gait_rmse_rad?));
         self.history.iter().filter_map(point).collect()
     }

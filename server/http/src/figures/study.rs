@@ -1,7 +1,7 @@
 //! The figures of a study, or of several.
 
 use super::outcome::StudyOutcome;
-use super::study_progress::{COURSE, course, warm_starts};
+use super::study_progress::{PROGRESS, progress_chart, warm_starts};
 use super::study_results::{MAX_IN_A_CHART, StudyResults, have_one_reference_gait};
 use crate::shared_state::AppState;
 use gait_optimizer::gait::stick_figure::stick_figures;
@@ -120,10 +120,10 @@ pub(crate) async fn of_study(app: &mut AppState, id: StudyId, others: &[StudyId]
 
 fn sections(shown: &[StudyWithBest], reference: &ReferenceGait) -> Result<Vec<FigureSection>, Error> {
     let mut snapshots: Vec<_> = shown.iter().map(|best| (&best.results.snapshot, &best.outcome)).collect();
-    let mut course_hint = "Figure 3b of the paper, which compares a study with muscles and one without.";
+    let mut progress_hint = "Figure 3b of the paper, which compares a study with muscles and one without.";
     if !have_one_reference_gait(&snapshots.iter().map(|(snapshot, _)| *snapshot).collect::<Vec<_>>()) {
         snapshots.truncate(1);
-        course_hint = "The studies have different reference gaits, so their Gait RMSE values cannot be compared.";
+        progress_hint = "The studies have different reference gaits, so their Gait RMSE values cannot be compared.";
     }
     let gaits: Vec<(&str, &Gait)> = shown.iter().filter_map(|best| Some((best.name(), best.gait.as_ref()?))).collect();
     let mut tiles = Vec::new();
@@ -133,10 +133,10 @@ fn sections(shown: &[StudyWithBest], reference: &ReferenceGait) -> Result<Vec<Fi
     let charts = |group: &str, charts: Vec<Chart>| charts.into_iter().map(|c| Figure::chart(group, c)).collect();
     Ok(vec![
         FigureSection {
-            id: COURSE,
+            id: PROGRESS,
             heading: "Gait RMSE of the best action by iteration",
-            hint: course_hint.to_owned(),
-            figures: charts(COURSE, course(&snapshots).into_iter().collect()),
+            hint: progress_hint.to_owned(),
+            figures: charts(PROGRESS, progress_chart(&snapshots).into_iter().collect()),
         },
         FigureSection {
             id: "angles",

@@ -9,20 +9,20 @@ use gaitwright_store::trials::{Trial, TrialState};
 use std::collections::HashMap;
 
 /// Group of the figures that show the progress of a study.
-pub(crate) const COURSE: &str = "course";
+pub(crate) const PROGRESS: &str = "progress";
 
 /// Gait RMSE of the best action by iteration, for one study with its trials or for several studies; `None` before the first
 /// converged trial.
-pub(crate) fn course(studies: &[(&StudySnapshot, &StudyOutcome)]) -> Option<Chart> {
+pub(crate) fn progress_chart(studies: &[(&StudySnapshot, &StudyOutcome)]) -> Option<Chart> {
     let title = "Gait RMSE of the best action by iteration";
     let mut chart = Chart::new(title, "iteration (in order of the results)", "Gait RMSE, rad");
     if let [(snapshot, outcome)] = studies {
         chart = chart.with("trial", 7, Stroke::Points, converged(snapshot));
-        chart = chart.with("best action so far", 0, Stroke::Steps, outcome.course());
+        chart = chart.with("best action so far", 0, Stroke::Steps, outcome.progress());
     } else {
         let strokes = Stroke::DISTINCT_STEPS.into_iter().cycle();
         for ((place, (snapshot, outcome)), stroke) in studies.iter().enumerate().zip(strokes) {
-            chart = chart.with(&snapshot.study.plan.name, place, stroke, outcome.course());
+            chart = chart.with(&snapshot.study.plan.name, place, stroke, outcome.progress());
         }
     }
     chart.whole_x = true;

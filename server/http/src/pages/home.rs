@@ -151,7 +151,7 @@ struct HomeRow {
     state: String,
     best_rmse: Option<String>,
     /// The lowest Gait RMSE so far by trial.
-    course: Option<String>,
+    progress: Option<String>,
     withdrawn: bool,
 }
 
@@ -214,12 +214,12 @@ async fn row(db: &mut Connection, study: Study) -> Result<HomeRow, Error> {
     let reference = reference_gaits::get(db, study.plan.reference_gait_id).await?.name;
     let withdrawn = consents::is_withdrawn(db, study.id).await?;
     let improvements = if withdrawn { Vec::new() } else { trials::improvements(db, study.id).await? };
-    let course: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
+    let progress: Vec<(f64, f64)> = improvements.iter().map(|(number, rmse)| (f64::from(*number), *rmse)).collect();
     Ok(HomeRow {
         state: state_in_words(study.state, counts),
         variant: variant(study.plan.muscles),
         best_rmse: improvements.last().map(|(_, rmse)| format!("{rmse:.4}")),
-        course: sparkline("Lowest Gait RMSE by trial", &course, f64::from(counts.total)),
+        progress: sparkline("Lowest Gait RMSE by trial", &progress, f64::from(counts.total)),
         study,
         subject,
         reference,

@@ -8,7 +8,7 @@ use crate::accessible::{Named, all_accessible};
 use crate::authorization::Authorized;
 use crate::bound_units;
 use crate::extractors::Params;
-use crate::figures::{COURSE, MAX_IN_A_CHART, StudyOutcome, StudyResults, course, have_one_reference_gait};
+use crate::figures::{MAX_IN_A_CHART, PROGRESS, StudyOutcome, StudyResults, have_one_reference_gait, progress_chart};
 use crate::format;
 use crate::page_error::{PageError, page};
 use crate::refused_fields::RefusedFields;
@@ -52,7 +52,7 @@ struct StudyComparisonPage {
 }
 
 /// The recommended gait of a study, or why there is none.
-struct RecommendedGait {
+struct ComparedGait {
     study: StudyId,
     name: String,
     /// The trial and its number.
@@ -67,13 +67,13 @@ struct Compared {
     comparable: bool,
     /// Whether Gait RMSE alone ranks the gaits of every study, so that the recommended gaits are sorted by it.
     ranked: bool,
-    recommended: Vec<RecommendedGait>,
+    recommended: Vec<ComparedGait>,
     /// The utility of the recommended gait of each study in which people answer.
     utilities: Vec<PageChart>,
     /// Gait RMSE of the best actions.
     chart: Option<PageChart>,
     /// Names of studies without a best action to draw.
-    without_course: Vec<String>,
+    without_progress: Vec<String>,
     /// The best gaits of two studies; empty if one has none, and of more studies.
     walking: Vec<WalkingGait>,
     /// Whether people answer in one of the studies.
@@ -160,7 +160,7 @@ fn people_answer(study: &Study) -> bool {
     study.plan.answer_source != AnswerSource::GaitRmse
 }
 
-impl RecommendedGait {
+impl ComparedGait {
     fn of(snapshot: &StudySnapshot, outcome: &StudyOutcome, comparable: bool, asks_people: bool) -> Self {
         let best = outcome.best.and_then(|id| snapshot.trial(id));
         let mut words = Vec::new();
@@ -260,10 +260,10 @@ fn compare(pool: &OnPool, all: &[StudyResults], analyses: &Analyses) -> Result<C
     let asks_people = snapshots.iter().any(|snapshot| people_answer(&snapshot.study));
     let ranked = comparable && !asks_people;
     let recommended =
-        both.iter().map(|(snapshot, outcome)| RecommendedGait::of(snapshot, outcome, comparable, asks_people));
-    let mut recommended: Vec<RecommendedGait> = recommended.collect();
+        both.iter().map(|(snapshot, outcome)| ComparedGait::of(snapshot, outcome, comparable, asks_people));
+    let mut recommended: Vec<ComparedGait> = recommended.collect();
     if ranked {
-        let rmse = |gait: &RecommendedGait| gait.gait_rmse_rad.unwrap_or(f64::INFINITY);
+        let rmse = |gait: &ComparedGait| gait.gait_rmse_rad.unwrap_or(f64::INFINITY);
         recommended.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
     }
     let mut utilities = Vec::new();
@@ -274,12 +274,12 @@ fn compare(pool: &OnPool, all: &[StudyResults], analyses: &Analyses) -> Result<C
         utilities.extend(chart.map(|chart| PageChart { title, ..chart }));
     }
     let identifiers: Vec<String> = snapshots.iter().map(|snapshot| snapshot.study.id.to_string()).collect();
-    let chart = if comparable { course(&both) } else { None };
+    let chart = if comparable { progress_chart(&both) } else { None };
     let chart = identifiers.split_first().zip(chart).map(|((first, others), chart)| {
         let files = format!("/api/v1/studies/{first}/figures");
-        PageChart::of(&Figure::chart(COURSE, chart), &files, &format!("?other={}", others.join(",")))
+        PageChart::of(&Figure::chart(PROGRESS, chart), &files, &format!("?other={}", others.join(",")))
     });
-    let without_course = both.iter().filter(|(_, outcome)| outcome.course().is_empty());
+    let without_progress = both.iter().filter(|(_, outcome)| outcome.progress().is_empty());
     let properties = all.iter().zip(&outcomes).map(|(study, outcome)| properties(study, outcome, comparable));
     Ok(Compared {
         comparable,
@@ -287,7 +287,7 @@ fn compare(pool: &OnPool, all: &[StudyResults], analyses: &Analyses) -> Result<C
         recommended,
         utilities,
         chart,
-        without_course: without_course.map(|(snapshot, _)| snapshot.study.plan.name.clone()).collect(),
+        without_progress: without_progress.map(|(snapshot, _)| snapshot.study.plan.name.clone()).collect(),
         walking: Vec::new(),
         asks_people,
         studies: snapshots.iter().map(|snapshot| (snapshot.study.id, snapshot.study.plan.name.clone())).collect(),

@@ -34,7 +34,7 @@ struct ReproduceReport<'a> {
 struct SubjectFigures {
     title: String,
     /// Figures 3b and 3c of the paper.
-    course_and_angles: Vec<ReportChart>,
+    progress_and_angles: Vec<ReportChart>,
     /// Figure 4: variant and tiles.
     tiles: Vec<(&'static str, String)>,
     /// Figure 5.
@@ -76,9 +76,9 @@ fn pair(comparison: &PairComparison, outcomes: &[ReproducedStudy]) -> Result<Sub
         outcomes.iter().filter(|o| (o.subject, o.seed) == (comparison.subject, comparison.seed)).collect();
     let gaits: Vec<(&'static str, &Gait)> =
         pair.iter().filter_map(|outcome| Some((label(outcome), outcome.gait.as_ref()?))).collect();
-    let mut course_and_angles = vec![drawn(&rmse_chart(&pair))];
+    let mut progress_and_angles = vec![drawn(&rmse_chart(&pair))];
     if let Some(first) = pair.first() {
-        course_and_angles.extend(gait_charts::with_reference(&gaits, &first.reference).iter().map(drawn));
+        progress_and_angles.extend(gait_charts::with_reference(&gaits, &first.reference).iter().map(drawn));
     }
     let mut tiles = Vec::with_capacity(gaits.len());
     for (name, gait) in &gaits {
@@ -86,7 +86,7 @@ fn pair(comparison: &PairComparison, outcomes: &[ReproducedStudy]) -> Result<Sub
     }
     Ok(SubjectFigures {
         title: format!("Subject {}, seed {}", comparison.subject, comparison.seed),
-        course_and_angles,
+        progress_and_angles,
         tiles,
         limit_cycles: gait_charts::limit_cycles(&gaits).iter().map(drawn).collect(),
     })

@@ -9,7 +9,7 @@ use super::trials_table::{TrialRow, TrialsQuery, TrialsTable};
 use super::without_gait::TrialsWithoutGait;
 use crate::AppState;
 use crate::bound_units::ANGLES;
-use crate::figures::{COURSE, StudyOutcome, course, utility, warm_starts};
+use crate::figures::{PROGRESS, StudyOutcome, progress_chart, utility, warm_starts};
 use crate::format;
 use crate::pages::certainty::certainty;
 use crate::pages::page_chart::PageChart;
@@ -297,7 +297,8 @@ fn view(
         unanswered: outcome.unanswered,
         people_answer: snapshot.study.plan.answer_source == AnswerSource::People,
         utility: utility.map(|figure| PageChart::of(&figure, &files, "")),
-        chart: course(&[(&snapshot, &outcome)]).map(|chart| PageChart::of(&Figure::chart(COURSE, chart), &files, "")),
+        chart: progress_chart(&[(&snapshot, &outcome)])
+            .map(|chart| PageChart::of(&Figure::chart(PROGRESS, chart), &files, "")),
         table,
         tree: warm_starts(&snapshot, outcome.best, Live::BRANCHES).map(|figure| PageChart::of(&figure, &files, "")),
         answers,
