@@ -145,7 +145,7 @@ impl GaitPage {
 pub(super) struct GaitQuery {
     #[serde(default)]
     sensitivities: bool,
-    /// The gaits to lay over this one.
+    /// The gaits to overlay on this one.
     #[serde(default)]
     other: Vec<Named<TrialId>>,
 }
