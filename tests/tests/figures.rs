@@ -225,7 +225,7 @@ async fn up_to_three_other_gaits_are_laid_over_a_gait() {
     let query = offered[..4].iter().map(|id| format!("other={id}")).collect::<Vec<_>>().join("&");
     let refused = service.fetch(&format!("{page}?{query}")).await;
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
-    let sentence = "At most 3 other gaits can be laid over a gait; 4 are chosen.";
+    let sentence = "At most 3 other gaits can be overlaid; 4 are chosen.";
     assert!(refused.text.contains(sentence) && refused.text.matches(" checked").count() == 4, "{}", refused.text);
     assert!(!linked(&refused.text, ".svg").iter().any(|address| address.contains("?other=")));
     let figure = format!("/api/v1/trials/{}/figures/angles-left-hip.csv", gait.id);

@@ -70,8 +70,8 @@ pub fn of_gait(gait: &Gait, reference: &ReferenceGait) -> Result<Vec<Group>, Mod
     Ok(groups)
 }
 
-/// The figures in which gaits are laid over each other, a chart for each joint of each leg. Groups have the names of those of
-/// one gait. Each gait comes with its name.
+/// The figures of overlaid gaits, a chart for each joint of each leg. Groups have the names of those of one gait. Each gait
+/// comes with its name.
 pub fn of_several(gaits: &[(&str, &Gait)], reference: &ReferenceGait) -> Vec<Group> {
     let gaits = overlaid_gait::named(gaits);
     let gaits = overlaid_gait::overlaid(&gaits);

@@ -31,7 +31,7 @@ pub struct HeatMap {
     pub cells: Vec<Vec<Tile>>,
     /// Values of the lightest and the darkest shade.
     pub range: (f64, f64),
-    /// Whether lines connect equal values. Counts have none between them.
+    /// Whether contour lines connect equal values. Counts have none between them.
     pub has_contours: bool,
 }
 
@@ -77,11 +77,22 @@ impl HeatMap {
         (LEFT + width * (column + 0.5), TOP + ROW * (row + 0.5))
     }
 
+    /// Whether contour lines are drawn. Maps have none if their values hardly differ.
+    pub fn draws_contours(&self) -> bool {
+        !self.contours().is_empty()
+    }
+
+    fn contours(&self) -> Vec<Contour> {
+        if !self.has_contours {
+            return Vec::new();
+        }
+        let grid: Vec<Vec<f64>> = self.cells.iter().map(|row| row.iter().map(|cell| cell.value).collect()).collect();
+        contours(&grid)
+    }
+
     fn draw(&self, svg: &mut String) -> std::fmt::Result {
         self.draw_cells(svg)?;
-        let grid: Vec<Vec<f64>> = self.cells.iter().map(|row| row.iter().map(|cell| cell.value).collect()).collect();
-        let lines = if self.has_contours { contours(&grid) } else { Vec::new() };
-        for Contour { pieces, .. } in lines {
+        for Contour { pieces, .. } in self.contours() {
             svg.push_str("<path class=\"contour\" d=\"");
             for piece in pieces {
                 let [from, to] = piece.map(|end| self.place(end));

@@ -75,7 +75,7 @@ pub(super) async fn of_study(
     params(
         ("id" = TrialId, Path, description = "Identifier of the trial"),
         ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
-        ("other" = Option<String>, Query, description = "1 to 3 comma-separated identifiers of converged trials of the same study with different gaits, which are laid over that of this trial"),
+        ("other" = Option<String>, Query, description = "1 to 3 comma-separated identifiers of converged trials of the same study with different gaits, which are overlaid on that of this trial"),
         ("local_optimum" = Option<u32>, Query, description = "Number of another local optimum of the trial. Without `other`")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),

@@ -139,8 +139,8 @@ pub(crate) fn maps(
 
 /// The text below each map.
 pub(crate) const MAP_NOTES: [&str; 2] = [
-    "Mean ± standard deviation. Lines connect equal means. The frame marks the best action.",
-    "Lines connect equal probabilities. The small numbers count the trials with these two values: yes means converged, no means not converged or not executable.",
+    "Mean ± standard deviation. Contour lines connect equal means. The frame marks the best action.",
+    "Contour lines connect equal probabilities. The small numbers count the trials with these two values: yes means converged, no means not converged or not executable.",
 ];
 
 /// How many trials with these levels converged and how many did not.

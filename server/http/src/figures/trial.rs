@@ -56,7 +56,7 @@ pub(crate) struct OverlaidGaits(Vec<(u32, Packed<Gait>)>);
 
 impl OverlaidGaits {
     /// # Errors
-    /// [`Error::NotFound`], [`Error::Invalid`] for a trial whose gait cannot be laid over the first one.
+    /// [`Error::NotFound`], [`Error::Invalid`] for a trial whose gait cannot be overlaid on the first one.
     pub(crate) async fn read(db: &mut Connection, trial: &Trial, others: &[TrialId]) -> Result<Self, Error> {
         let others = overlaid_gaits::others(db, trial, "other", others).await?;
         let mut gaits = Vec::new();
@@ -78,7 +78,7 @@ impl OverlaidGaits {
     }
 }
 
-/// The figures in which other gaits are laid over that of a trial, as on its page and on the page that compares two gaits.
+/// The figures in which other gaits are overlaid on that of a trial, as on its page and on the page that compares two gaits.
 ///
 /// # Errors
 /// As [`OverlaidGaits::read`]; errors of the database.

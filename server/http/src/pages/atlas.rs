@@ -128,9 +128,9 @@ fn show(
         (Some(pair), Some(best)) => maps(&atlas, space, pair, best.action).map_err(Error::Learner)?,
         _ => Vec::new(),
     };
-    let chart = |(map, note): (&gaitwright_charts::HeatMap, &'static str)| PageChart {
+    let chart = |(map, [with_lines, without_lines]): (&gaitwright_charts::HeatMap, [&'static str; 2])| PageChart {
         title: map.title.clone(),
-        note,
+        note: if map.draws_contours() { with_lines } else { without_lines },
         svg: map.svg(),
         is_wide: true,
         legend: Vec::new(),
@@ -148,11 +148,14 @@ fn show(
     })
 }
 
-/// The text below each map.
-const NOTES: [&str; 3] = [
-    "Lines, if any, connect equal values. The frame marks the gait with the lowest Gait RMSE; – means that the action has no result yet.",
-    "Lines, if any, connect equal values.",
-    "The number of bounds that cannot move without changing the gait, and their names.",
+/// The text below each map, with contour lines and without.
+const NOTES: [[&str; 2]; 3] = [
+    [
+        "Contour lines connect equal values. The frame marks the gait with the lowest Gait RMSE; – means that the action has no result yet.",
+        "The frame marks the gait with the lowest Gait RMSE; – means that the action has no result yet.",
+    ],
+    ["Contour lines connect equal values.", ""],
+    ["The number of bounds that cannot move without changing the gait, and their names."; 2],
 ];
 
 /// About how long an atlas that runs still takes; empty if that is unknown.

@@ -69,7 +69,7 @@ struct GaitPage {
     /// The sensitivities, or why there are none.
     sensitivities: Option<Result<SensitivityTable, String>>,
     groups: Vec<ChartSection>,
-    /// The gaits that can be laid over this one; `None` if it has no gait to show.
+    /// The gaits that can be overlaid on this one; `None` if it has no gait to show.
     overlay: Option<GaitOverlay>,
     solve: Option<PageChart>,
     /// The stride as a row of pictures.
@@ -145,7 +145,7 @@ impl GaitPage {
 pub(super) struct GaitQuery {
     #[serde(default)]
     sensitivities: bool,
-    /// The gaits to lay over this one.
+    /// The gaits to overlay on this one.
     #[serde(default)]
     other: Vec<Named<TrialId>>,
 }

@@ -1,4 +1,4 @@
-//! The part of the page of a gait in which other gaits of the study are chosen and laid over it.
+//! The part of the page of a gait in which other gaits of the study are chosen and overlaid.
 
 use crate::figures::trial::OverlaidGaits;
 use crate::refused_fields::{FieldLabels, RefusedFields, TypedForm};
@@ -27,7 +27,7 @@ impl TypedForm for OverlayForm {
     }
 }
 
-/// Trials with the same gait, of which the first one is laid over the gait of the page.
+/// Trials with the same gait, of which the first one is overlaid on the gait of the page.
 pub(super) struct OfferedTrials {
     pub(super) id: TrialId,
     pub(super) is_chosen: bool,
@@ -35,7 +35,7 @@ pub(super) struct OfferedTrials {
     pub(super) name: String,
 }
 
-/// The gaits that can be laid over that of the page, and those that are.
+/// The gaits that can be overlaid on that of the page, and those that are.
 pub(super) struct GaitOverlay {
     pub(super) offered: Vec<OfferedTrials>,
     /// Maximum number of chosen trials.

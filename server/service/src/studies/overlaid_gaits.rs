@@ -1,4 +1,4 @@
-//! Decides which gaits of a study can be laid over the gait of a trial in charts.
+//! Decides which gaits of a study can be overlaid on the gait of a trial in charts.
 
 use super::identical_gaits::{is_same_gait, pooled};
 use super::preference_answer::comparable;
@@ -6,17 +6,17 @@ use crate::error::{Error, FieldError};
 use gaitwright_store::trials::{Trial, TrialState};
 use gaitwright_store::{Connection, TrialId, gaits, trials};
 
-/// So many gaits can be laid over that of a trial: more lines in a chart cannot be told apart.
+/// So many gaits can be overlaid on that of a trial: more lines in a chart cannot be told apart.
 pub const MAX_OTHERS: usize = 3;
 
-/// The other trials whose gaits are laid over that of `trial`; `field` names them.
+/// The other trials whose gaits are overlaid on that of `trial`; `field` names them.
 ///
 /// # Errors
 /// [`Error::Invalid`] for too many trials, for a trial of another study, without a converged gait or without its
 /// trajectory, and for two trials with the same gait.
 pub async fn others(db: &mut Connection, trial: &Trial, field: &str, ids: &[TrialId]) -> Result<Vec<Trial>, Error> {
     if ids.len() > MAX_OTHERS {
-        let message = format!("At most {MAX_OTHERS} other gaits can be laid over a gait; {} are chosen.", ids.len());
+        let message = format!("At most {MAX_OTHERS} other gaits can be overlaid; {} are chosen.", ids.len());
         return Err(FieldError::in_words(field, &message).into());
     }
     let mut others: Vec<Trial> = Vec::new();
@@ -39,7 +39,7 @@ pub async fn others(db: &mut Connection, trial: &Trial, field: &str, ids: &[Tria
     Ok(others)
 }
 
-/// The trials among the newest ones of the study whose gaits can be laid over that of `trial`. Trials with the same gait
+/// The trials among the newest ones of the study whose gaits can be overlaid on that of `trial`. Trials with the same gait
 /// are in one group, in the order of their numbers.
 ///
 /// # Errors

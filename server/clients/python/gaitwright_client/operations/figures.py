@@ -92,7 +92,7 @@ class FiguresMethods(Transport):
         all of them, a figure for each joint of each leg. With a local optimum, shows the gait of that one.
 
         other: 1 to 3 comma-separated identifiers of converged trials of the same study with different gaits, which are
-        laid over that of this trial.
+        overlaid on that of this trial.
 
         local_optimum: Number of another local optimum of the trial. Without `other`.
         """

@@ -16,7 +16,7 @@ pub(super) fn time_left(snapshot: &StudySnapshot, results: u32, workers: usize, 
         return String::new();
     }
     if study.plan.atlas == AtlasRole::Make {
-        return "The page of the atlas says about how long it still takes.".to_owned();
+        return "The atlas page shows the estimated time left.".to_owned();
     }
     if study.plan.evaluation == Evaluation::Script {
         return "The time left depends on the script that evaluates the trials.".to_owned();
