@@ -37,9 +37,9 @@ pub const RANGES: [&str; 2 + TunedBounds::COUNT] = {
 pub struct ValueRange {
     /// One of [`RANGES`].
     pub column: &'static str,
-    /// Least value.
+    /// Minimum.
     pub from: f64,
-    /// Greatest value.
+    /// Maximum.
     pub to: f64,
 }
 
