@@ -67,9 +67,9 @@ pub struct Listing {
 pub enum ListStart {
     /// With the first trial.
     First,
-    /// After a trial that had this place, whatever became of it since.
+    /// After this place, even if the trial that had it has moved.
     After(TrialPlace),
-    /// So that it ends before a trial that had this place.
+    /// So that it ends before this place, even if the trial that had it has moved.
     Before(TrialPlace),
 }
 
