@@ -183,7 +183,7 @@ impl Scene {
         let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let without_gait = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap().id;
         let (first, second) = (converged[0], converged[1]);
-        // The same values to the last bit: what a bound gives that no gait comes near.
+        // Exactly equal results, as with two values of a bound that the gait does not reach.
         let equal = converged[2].id;
         let scene = Self { _folder: folder, service, study, pair: (first.id, second.id), without_gait, equal };
         let report = serde_json::to_string(first.report.as_ref().unwrap()).unwrap();

@@ -94,7 +94,7 @@ async fn send_from_page(service: &Service, path: &str) -> Answer {
     service.send(request).await
 }
 
-/// What makes an answer less than a page of the site, if anything.
+/// Why a response is not a complete page of the site; `None` if it is one, or is a redirect or JSON.
 fn bare(answer: &Answer) -> Option<String> {
     if answer.status == StatusCode::SEE_OTHER || answer.content_type().starts_with("application/json") {
         return None;
