@@ -70,7 +70,7 @@ async fn service() -> (TempDir, Service, String) {
 }
 
 #[test]
-fn the_client_is_what_the_generator_makes_of_the_description() {
+fn client_matches_generator_output() {
     // `json` is in every Python: without it there is no python3.
     ran(&["json"], &["generate.py", "--check"]);
 }
