@@ -40,7 +40,7 @@ fn has(modules: &[&str]) -> bool {
     true
 }
 
-/// What a Python program with these modules prints, or `None` if it is skipped. A program that fails fails the test.
+/// Output of a Python program with these modules, or `None` if it is skipped. A program that fails fails the test.
 fn ran(modules: &[&str], arguments: &[&str]) -> Option<String> {
     if !has(modules) {
         return None;
