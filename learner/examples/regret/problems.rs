@@ -25,7 +25,7 @@ pub struct GaitOfAction {
     pub active: Vec<bool>,
 }
 
-/// What a study knows of gaits besides the answers.
+/// Knowledge of a study about gaits besides the answers.
 #[derive(Clone, Copy, Default)]
 pub struct Knowledge {
     /// Which actions have the gait of a visited action: they are not proposed.

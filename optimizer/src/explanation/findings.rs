@@ -1,4 +1,4 @@
-//! What an explanation states: conflicts, the bounds that were reached, and relaxations.
+//! Findings of an explanation: conflicts, the bounds that were reached, and relaxations.
 
 use super::given_bound::BoundValue;
 use super::relaxation::{JointRelaxation, Relaxation};

@@ -14,7 +14,7 @@ use serde_path_to_error::{Path, Segment};
 use std::borrow::Cow;
 use std::fmt;
 
-/// What a structure must be.
+/// The expected form of a structure.
 const OBJECT: &str = "an object with named fields";
 
 /// Maximum length of a value in an error, characters.

@@ -12,7 +12,7 @@ use gaitwright_store::studies::{AnswerSource, SimulatedWalks};
 /// A computed answer.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ComputedAnswer {
-    /// What it says.
+    /// Content of the answer.
     pub(super) content: FeedbackContent,
     /// Its reason; empty if Gait RMSE alone decided.
     pub(super) note: String,

@@ -80,7 +80,7 @@ impl<J: TrialJob> TrialJobs<J> {
         Self { store, job, queue: Mutex::default(), wake: Notify::new() }
     }
 
-    /// What the jobs do.
+    /// The work of the jobs.
     pub(super) fn job(&self) -> &J {
         &self.job
     }
