@@ -140,7 +140,7 @@ pub(super) async fn of_study(
 
 /// Get a trial
 ///
-/// Its action, state, reason and result. Null where there is none yet.
+/// The action, state, reason and result of the trial. Values that do not exist are null.
 #[utoipa::path(
     get,
     path = "/trials/{id}",
