@@ -28,7 +28,7 @@ pub enum LearnerError {
     InvalidDimension {
         /// Name of the dimension.
         dimension: String,
-        /// What is wrong with it.
+        /// Reason for the refusal.
         reason: String,
     },
     /// The lengthscale is so short that actions are uncorrelated, or so long that they are indistinguishable.
@@ -56,7 +56,7 @@ pub enum LearnerError {
     InvalidDescriptor {
         /// Index of the descriptor, counted from 0.
         descriptor: usize,
-        /// What is wrong with it.
+        /// Reason for the refusal.
         reason: String,
     },
     /// The lengthscale of the descriptors is out of range.
@@ -152,7 +152,7 @@ pub enum LearnerError {
     InvalidSetting {
         /// Name of the setting.
         setting: &'static str,
-        /// What is wrong with it; follows the name of the setting.
+        /// Reason for the refusal; follows the name of the setting.
         reason: String,
     },
     /// No action is left to propose: each has been visited or is pending. If actions may be repeated, each is pending.

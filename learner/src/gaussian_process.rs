@@ -21,7 +21,7 @@ pub(crate) struct GaussianProcess {
     pub(crate) fit: Arc<Fit>,
 }
 
-/// What the moments of one action need, computed once.
+/// Values from which the moments of one action follow, computed once.
 pub(crate) struct View {
     levels: Vec<usize>,
     slot: Option<usize>,

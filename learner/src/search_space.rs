@@ -148,7 +148,7 @@ impl SearchSpace {
         Ok(Self { dimensions, len, descriptors: None })
     }
 
-    /// The space with a descriptor of each action, in whose place the levels no longer say how alike two actions are. The
+    /// The space with a descriptor for each action. Descriptors replace levels in the prior correlations of two actions. The
     /// serialised form of a space lacks the descriptors.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What each naturalness term does: Gait RMSE, cost, solve time, and what a clinician looks at.
+//! Effect of each naturalness term on Gait RMSE, cost, solve time, and values that clinicians look at.
 //!
 //! `cargo run --release -p gait-optimizer --example naturalness -- [--subject 1] [--muscles off] [--folder FOLDER]`: one CSV
 //! row per set of settings, each solved cold with the default bounds; with a folder every gait as a file, for
@@ -15,7 +15,7 @@ use gait_optimizer::{
 use std::error::Error;
 use std::path::Path;
 
-/// What a naturalness term changes in a solve.
+/// Settings of a solve, changed by a naturalness term.
 struct Variant {
     name: &'static str,
     settings: GaitSettings,

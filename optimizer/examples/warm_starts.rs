@@ -39,8 +39,7 @@ fn run(
 /// Largest number of draws until a change is found.
 const DRAWS: usize = 10_000;
 
-/// The bounds with some distinct ones set to other values, none of which leaves the gait of `unchanged` as it is; `None` if
-/// there are too few.
+/// Changes `count` bounds to values outside the intervals of `unchanged`; `None` if too few bounds have such values.
 fn changed(
     from: TunedBounds,
     count: usize,

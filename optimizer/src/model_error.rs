@@ -89,7 +89,7 @@ impl ModelError {
         Err(Self::OutOfRange { field, value, minimum, maximum, unit, relation })
     }
 
-    /// What is allowed, which completes the sentence "it must be ..."; `None` for a text that cannot be parsed.
+    /// The allowed values, which complete the sentence "it must be ..."; `None` for a text that cannot be parsed.
     pub fn allowed(&self) -> Option<String> {
         match self {
             Self::OutOfRange { minimum, maximum, unit, relation, .. } => {

@@ -34,7 +34,7 @@ use tower::ServiceExt;
 pub struct Service {
     /// The record.
     pub store: Store,
-    /// What runs its studies.
+    /// Scheduler of its studies.
     pub scheduler: Scheduler,
     /// Access control. By default sign-in is off, so every caller has all rights.
     pub access: Arc<AccessState>,
@@ -57,7 +57,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// What a response has.
+    /// Status, headers and text of a response.
     pub async fn of(response: Response<Body>) -> Self {
         let (status, headers) = (response.status(), response.headers().clone());
         let bytes = response.into_body().collect().await.unwrap().to_bytes();
@@ -255,7 +255,7 @@ impl Service {
         panic!("the study did not reach {ended} trials");
     }
 
-    /// What handlers can reach.
+    /// State of the handlers.
     pub fn state(&self) -> AppState {
         let hosts = Hosts::new(([127, 0, 0, 1], 0).into(), &[]);
         AppState::new(self.scheduler.clone(), Arc::clone(&self.access), Arc::clone(&self.backups), hosts)

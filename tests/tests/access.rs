@@ -331,7 +331,7 @@ async fn password_change_requires_the_old_password_or_a_recent_link() {
         let (service, who, body) = (&service, who.clone(), body.to_owned());
         async move { send(service, &who, &Method::POST, "/account", FORM, &body).await }
     };
-    // Nothing to know yet; and then, whoever has the session alone does not take the account.
+    // The user has no password yet. Afterwards, a session is not enough to replace it.
     let first = session_of(&change(&come(&link).await, "password=correct+horse+battery").await);
     for body in [
         "password=battery+staple+meadow",

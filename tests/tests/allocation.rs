@@ -720,7 +720,7 @@ async fn person_who_fetches_a_controller_file_is_recorded_as_unblinded_but_the_d
 }
 
 #[tokio::test]
-async fn fetch_by_a_token_unblinds_everybody_and_fetch_by_the_device_nobody() {
+async fn controller_file_fetched_by_a_script_makes_answers_not_blind_but_by_a_device_does_not() {
     let (_folder, service) = one_service().await;
     let (study, trials) = finished(&service).await;
     let person = gaitwright_service::access::Caller::person(UserId::fresh(), "Ada", Role::Clinician);

@@ -47,7 +47,7 @@ async fn made(service: &Service, change: impl FnOnce(&mut NewStudy)) -> StudyId 
     atlas.await
 }
 
-/// What distinguishes the gaits of this solver; `None` without one.
+/// Values that distinguish the gaits of this solver; `None` without a gait.
 fn gait(trial: &Trial) -> Option<[u64; 3]> {
     let bounds = &trial.action;
     trial.state.has_gait().then(|| [bounds.a1, bounds.a5, bounds.a6].map(f64::to_bits))

@@ -158,7 +158,7 @@ fn check(what: &str, answer: &Answer, id: &str, code: &str, secrets: &BTreeSet<S
     }
 }
 
-/// What is left of an answer without what names the pair and what is drawn of it.
+/// The response with the code and the number of its pair masked, and without the pictures and the duration of the strides.
 fn masked(answer: &Answer, pair: &Value) -> (StatusCode, String, Vec<(String, String)>) {
     let code = pair["code"].as_str().unwrap();
     let mut text = answer.text.replace(code, "TOKEN");

@@ -29,7 +29,7 @@ const ITERATION: Duration = Duration::from_millis(15);
 const QUEUE: &str = "contract";
 const TRIALS: u32 = 4;
 
-/// What happens to the first solve of a worker.
+/// Behaviour of a worker during its first solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Worker {
     Steady,

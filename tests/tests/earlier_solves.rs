@@ -8,7 +8,7 @@ use gaitwright_tests::analytic::Analytic;
 use gaitwright_tests::service::Service;
 use std::sync::Arc;
 
-/// What the record has of the trials of a study, and the names of their workers.
+/// Results of the trials of a study in the record, and the names of their workers.
 async fn results(service: &Service, study: StudyId) -> (Vec<String>, Vec<String>) {
     let (mut found, mut workers) = (Vec::new(), Vec::new());
     for trial in service.trials(study).await {

@@ -23,7 +23,7 @@ use tempfile::TempDir;
 
 const FORM: &str = "application/x-www-form-urlencoded";
 
-/// What an entry point does with a gait.
+/// Use of a gait by an entry point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum EntryPoint {
     /// A preference between two gaits that somebody chose.
@@ -78,7 +78,7 @@ const UNDOES: EntryPoint = EntryPoint::None("undoes an answer; `undo.rs` holds i
 const RUNS: EntryPoint = EntryPoint::None("runs solves, certifications or simulations; no person answers");
 const SETS_UP: EntryPoint = EntryPoint::None("sets up subjects, devices, references, users or the service");
 
-/// What an operation does with a gait; `None` if neither this function nor a file classifies it.
+/// Use of a gait by an operation; `None` if neither this function nor a file classifies it.
 fn entry_point_of(operation: &str) -> Option<EntryPoint> {
     Some(match operation {
         "post /api/v1/studies/{id}/preferences" | "post /studies/{id}/compare" => EntryPoint::Preference,
@@ -183,7 +183,7 @@ impl Scene {
         let converged: Vec<_> = trials.iter().filter(|trial| trial.state == TrialState::Converged).collect();
         let without_gait = trials.iter().find(|trial| trial.state == TrialState::NotConverged).unwrap().id;
         let (first, second) = (converged[0], converged[1]);
-        // The same values to the last bit: what a bound gives that no gait comes near.
+        // Exactly equal results, as with two values of a bound that the gait does not reach.
         let equal = converged[2].id;
         let scene = Self { _folder: folder, service, study, pair: (first.id, second.id), without_gait, equal };
         let report = serde_json::to_string(first.report.as_ref().unwrap()).unwrap();
@@ -346,7 +346,7 @@ fn unknown_get_route_fails_until_it_is_classified() {
     }
 }
 
-/// What each command has to do with people and devices.
+/// Relation of each command to people and devices.
 const COMMANDS: [(&str, &str); 25] = [
     ("convert", "makes tables and pictures of a gait file, and nothing for a device"),
     ("import", "writes the rows of an archive after checking them: `archives.rs` holds its rules"),

@@ -93,7 +93,8 @@ async fn every_figure_of_a_page_is_served_in_every_format() {
             }
         }
     }
-    let progress = format!("/api/v1/studies/{}/figures/progress-gait-rmse-of-the-best-action-by-iteration.csv", studies[0]);
+    let progress =
+        format!("/api/v1/studies/{}/figures/progress-gait-rmse-of-the-best-action-by-iteration.csv", studies[0]);
     let (_, csv) = file(&service, &progress).await;
     let history = service.fetch(&format!("/api/v1/studies/{}/history", studies[0])).await.items();
     let csv = String::from_utf8(csv).unwrap();

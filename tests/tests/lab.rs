@@ -416,7 +416,7 @@ async fn archive_preserves_the_lab_sessions_of_its_study() {
     other.close().await;
 }
 
-/// What six decimals in the file leave.
+/// Tolerance for the rounding of the file to six decimals.
 const ROUNDED: f64 = 1e-5;
 
 fn with_heel(walk: u8, recording: &str) -> Value {

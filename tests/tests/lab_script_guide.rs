@@ -107,7 +107,7 @@ fn operations() -> BTreeMap<(String, String), Vec<String>> {
     all
 }
 
-/// What is wrong with a request of the guide.
+/// Fault of a request of the guide, if any.
 fn fault(request: &Request, operations: &BTreeMap<(String, String), Vec<String>>) -> Option<String> {
     let path = template(&request.path);
     let has_method = |method: &str| request.method.as_deref().is_none_or(|asked| asked == method);

@@ -74,7 +74,7 @@ async fn gaits_of_all_local_optima_are_served_and_start_other_studies() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn local_optima_come_with_an_earlier_result_and_go_with_the_gait() {
+async fn local_optima_are_copied_with_earlier_results_and_pruned_with_the_gait() {
     let folder = tempfile::tempdir().unwrap();
     let solver = Analytic { other_local_optima: 1, ..Analytic::default() };
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;

@@ -40,7 +40,7 @@ fn has(modules: &[&str]) -> bool {
     true
 }
 
-/// What a Python program with these modules prints, or `None` if it is skipped. A program that fails fails the test.
+/// Output of a Python program with these modules, or `None` if it is skipped. A program that fails fails the test.
 fn ran(modules: &[&str], arguments: &[&str]) -> Option<String> {
     if !has(modules) {
         return None;
@@ -70,7 +70,7 @@ async fn service() -> (TempDir, Service, String) {
 }
 
 #[test]
-fn the_client_is_what_the_generator_makes_of_the_description() {
+fn client_matches_generator_output() {
     // `json` is in every Python: without it there is no python3.
     ran(&["json"], &["generate.py", "--check"]);
 }

@@ -15,7 +15,7 @@ use gaitwright_tests::page_routes;
 use gaitwright_tests::service::{Answer, Service};
 use serde_json::{Value, json};
 
-/// What no field accepts: control characters belong neither to a number nor to a name or a note.
+/// An entry that no field accepts: control characters belong neither to a number nor to a name or a note.
 const NONSENSE: &str = "%07%07";
 
 /// Routes without a field that a person fills in, with the reason.
@@ -63,7 +63,7 @@ fn notice(answer: &Answer) -> String {
     notice.split("</div>").next().unwrap().split("<form").next().unwrap().to_owned()
 }
 
-/// What is wrong with the answer to a refused entry, if anything.
+/// Fault of the response to a refused entry, if any.
 fn fault(form: &Form, answer: &Answer, labels: &[&str]) -> Option<String> {
     if ![StatusCode::UNPROCESSABLE_ENTITY, StatusCode::CONFLICT].contains(&answer.status) {
         let heading = answer.text.split("<main").nth(1).unwrap_or(&answer.text);
@@ -94,7 +94,7 @@ async fn send_from_page(service: &Service, path: &str) -> Answer {
     service.send(request).await
 }
 
-/// What makes an answer less than a page of the site, if anything.
+/// Why a response is not a complete page of the site; `None` if it is one, or is a redirect or JSON.
 fn bare(answer: &Answer) -> Option<String> {
     if answer.status == StatusCode::SEE_OTHER || answer.content_type().starts_with("application/json") {
         return None;

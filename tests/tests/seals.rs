@@ -259,7 +259,7 @@ async fn later_change_does_not_seal_a_row_of_another_program() {
         }
         std::fs::copy(&database, &copy).unwrap();
         let store = Store::open(&copy).await.unwrap();
-        // Whatever the rows, the program may change them as long as they are its own.
+        // Before another program changes a row, the service can make this change.
         if sql != user {
             let mut writer = store.write().await.unwrap();
             let done = sqlx::query(AssertSqlSafe(change)).execute(&mut **writer).await.unwrap();

@@ -486,7 +486,7 @@ async fn disabling_a_user_ends_their_tokens_and_sessions() {
     );
     assert_eq!(status(&service, &made[1].1).await, StatusCode::OK);
     assert_eq!(status(&service, &made[1].2).await, StatusCode::UNAUTHORIZED);
-    // What has ended stays so.
+    // Enabling the user restores neither sessions nor tokens.
     assert_eq!(post(&service, &root, &to(0, "enable"), &json!({})).await.0, StatusCode::OK);
     assert_eq!([status(&service, &made[0].1).await, status(&service, &made[0].2).await], both);
     assert_eq!(trail(&service, "token.revoke").await.len(), 3);

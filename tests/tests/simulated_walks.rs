@@ -54,7 +54,7 @@ async fn reported(store: &Store, trial: &Trial) -> Option<f64> {
 /// Number, action, state, Gait RMSE and mean strides of a trial.
 type Found = (u32, u64, TrialState, Option<f64>, Option<f64>);
 
-/// What a study found, without identifiers and times.
+/// Results of a study, without identifiers and times.
 fn results(trials: &[Trial]) -> Vec<Found> {
     let of = |trial: &Trial| (trial.number, trial.action_index.0, trial.state, trial.gait_rmse_rad, trial.mean_strides);
     trials.iter().map(of).collect()

@@ -545,7 +545,7 @@ async fn person_answers_a_pair_once_under_any_spelling_of_the_name() {
         let sent = send(&service, &script, &Method::POST, &address, JSON, &answer(Some(author), "subject")).await;
         assert_eq!(sent.status, status, "{author}: {}", sent.text);
     }
-    // Who signed in is known.
+    // A signed-in user cannot answer under another name.
     let other = send(&service, &clinician, &Method::POST, &address, JSON, &answer(Some("Ada"), "clinician")).await;
     assert_eq!(other.status, StatusCode::UNPROCESSABLE_ENTITY, "{}", other.text);
     let own = send(&service, &clinician, &Method::POST, &address, JSON, &answer(None, "clinician")).await;

@@ -88,7 +88,7 @@ async fn learner_uses_a_suggestion_until_it_is_retracted() {
 }
 
 #[tokio::test]
-async fn suggestion_counts_once_for_each_person_and_not_besides_their_answer() {
+async fn suggestion_and_answer_of_one_person_do_not_both_count() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(&folder.path().join("a.db"), Analytic::default(), 1).await;
     let study = service.study(|new| (new.number_of_trials, new.answer_source) = (12, AnswerSource::Both)).await;

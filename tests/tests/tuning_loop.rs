@@ -20,7 +20,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What must be the same in two runs with the same seed: everything but identifiers and times.
+/// Values that must be the same in two runs with the same seed: everything but identifiers and times.
 fn essence(trials: &[Trial]) -> Vec<String> {
     let number: HashMap<_, _> = trials.iter().map(|trial| (trial.id, trial.number)).collect();
     trials

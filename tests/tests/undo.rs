@@ -318,7 +318,7 @@ async fn raters_answer_a_pair_once_and_staff_neither_change_nor_undo_it() {
 }
 
 #[tokio::test]
-async fn answer_of_a_lab_session_is_asked_again_after_a_retraction_and_undone_once_staff_change_it() {
+async fn lab_answer_can_be_given_again_after_a_retraction_and_its_change_by_staff_undone() {
     let (_folder, service, study, a, b) = started().await;
     for _ in 0..2 {
         let session = json!({"trial_a": a, "trial_b": b});

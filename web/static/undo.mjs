@@ -27,7 +27,7 @@ function countDown(form, end) {
   };
   const clock = setInterval(look, TICK);
   look();
-  // Nothing that waits for the end replaces the page while the answer is being undone.
+  // Stop the countdown, so that its end does not replace the page during the undo.
   form.addEventListener("submit", () => clearInterval(clock));
   document.addEventListener("keydown", (event) => {
     const field = /** @type {Element} */ (event.target).closest("input, textarea");

@@ -25,7 +25,7 @@ pub struct GaitOfAction {
     pub active: Vec<bool>,
 }
 
-/// What a study knows of gaits besides the answers.
+/// Knowledge of a study about gaits besides the answers.
 #[derive(Clone, Copy, Default)]
 pub struct Knowledge {
     /// Which actions have the gait of a visited action: they are not proposed.
@@ -34,7 +34,7 @@ pub struct Knowledge {
     pub inactive: bool,
 }
 
-/// Number of gaits from which on a dimension that was active in none of them is ignored.
+/// A dimension that was inactive in all gaits so far is ignored if there are at least this many.
 const MIN_GAITS: usize = 2;
 /// Factor on the lengthscale of a dimension that the learner ignores: its levels are fully correlated.
 const IGNORED: f64 = 1e4;

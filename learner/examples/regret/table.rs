@@ -32,7 +32,7 @@ pub const DEFAULT_COLUMNS: &str = "gait_rmse_other_rad,peak_hip_torque_nm_kg,ste
 /// Number of leading columns that are the values of an action.
 const DIMENSIONS: usize = 8;
 
-/// What people care about.
+/// Preferences of simulated people.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub enum People {
     /// Low values of the columns: the utility is a mixture with random weights.

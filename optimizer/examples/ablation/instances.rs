@@ -14,7 +14,7 @@ use crate::splitmix::SplitMix;
 use crate::standard_problems::sets::{self, Case};
 use crate::tuned_actions::{LEVELS, TIGHT};
 
-/// What a variant changes.
+/// Settings that a variant changes.
 pub(crate) struct Target {
     pub settings: NlpSettings,
     /// The initial guess of gaits.

@@ -1,4 +1,4 @@
-//! What a certificate is about: which gait of which walker.
+//! Identity of the gait that a certificate is about: which gait of which walker.
 
 use super::differences_from_defaults::{Difference, differences};
 use crate::body::WalkerModel;
@@ -28,7 +28,7 @@ pub struct CertifiedGait {
 }
 
 impl CertifiedGait {
-    /// What a certificate of the gait is about, without certifying it.
+    /// Identity of a gait, as its certificate states it, without certifying it.
     ///
     /// # Errors
     /// [`ModelError`] if the gait is malformed.

@@ -4,7 +4,7 @@
 //! balance. Torques follow their commands with a first-order lag; the gains are lower than those of a drive; the
 //! feed-forward torques lead by the lag, because people anticipate. The hip of a loaded leg keeps the torso upright
 //! instead of tracking its own angle, and the hip of a swinging leg tracks the thigh in space, as people do. The person
-//! senses the own body without error, so the hip position over the toe of the stance leg tells the time of the stride.
+//! senses their own body without error, so the hip position over the toe of the stance leg tells the time of the stride.
 
 use super::actuator::LaggedJoint;
 use super::control_period::CONTROL_PERIOD_S;

@@ -24,7 +24,7 @@ const FORCE_NOISE_N: f64 = 5.0;
 /// Standard deviation of the constant error of the thigh angle in a walk, rad: half a degree (assumption).
 pub(super) const THIGH_OFFSET_RAD: f64 = 8.7e-3;
 
-/// What the prosthesis measures.
+/// Measurements of the prosthesis.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct SensorReadings {
     /// Forward angle of the thigh from the vertical, rad.

@@ -261,7 +261,7 @@ impl Explanation {
         alone.chain(together).chain(in_vain).collect()
     }
 
-    /// What may be missing from an explanation that was stopped early, as a sentence.
+    /// Findings that an explanation may lack because it was stopped early, as a sentence.
     pub fn stopped_in_words(&self) -> Option<&'static str> {
         self.stopped_early.then_some(
             "This explanation was stopped early: further conflicts, and other or smaller relaxations, may exist.",

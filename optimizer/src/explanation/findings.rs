@@ -1,4 +1,4 @@
-//! What an explanation states: conflicts, the bounds that were reached, and relaxations.
+//! Findings of an explanation: conflicts, the bounds that were reached, and relaxations.
 
 use super::given_bound::BoundValue;
 use super::relaxation::{JointRelaxation, Relaxation};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct BoundAtLimit {
     /// Name of the bound.
     pub bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     pub meaning: String,
     /// Its value.
     pub value: f64,

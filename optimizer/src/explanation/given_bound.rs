@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct BoundValue {
     /// Name of the bound.
     pub bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     pub meaning: String,
     /// Its value.
     pub value: f64,

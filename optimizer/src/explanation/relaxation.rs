@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Relaxation {
     /// Name of the bound.
     pub bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     pub meaning: String,
     /// The given value.
     pub from: f64,
@@ -35,7 +35,7 @@ pub struct Relaxation {
 pub struct RelaxedBound {
     /// Name of the bound.
     pub bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     pub meaning: String,
     /// The given value.
     pub from: f64,

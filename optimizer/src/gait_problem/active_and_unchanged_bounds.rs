@@ -71,7 +71,7 @@ impl ConvergedGait<'_> {
     /// exceeds bounds between its nodes.
     pub(crate) fn unchanged_bounds(&self) -> Vec<UnchangedBound> {
         let values = self.problem.bounds.to_array();
-        // A solve would go on tightening a gait with an excess, whatever its bounds.
+        // With any bounds, a solve would tighten a gait that exceeds a bound between nodes.
         if self.checks_between_nodes && inter_node_excess(self.program, self.gait, &self.point.x).worst > 1.0 {
             return Vec::new();
         }
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_that_a_stricter_limit_replaces_change_nothing() {
+    fn bounds_overridden_by_a_stricter_limit_have_no_effect() {
         let (problem, outcome) = solved("a5=0.0");
         // The settings demand some clearance in any case.
         assert!(problem.settings.limits.clearance_min_m > 0.0);

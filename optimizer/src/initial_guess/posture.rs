@@ -77,8 +77,8 @@ enum RowTreatment {
     Soft,
 }
 
-/// Coordinates of each node, `result[domain][node]`. They satisfy contacts and ranges as well as the bounds, and the
-/// linearisations before a cancellation, allow.
+/// Coordinates of each node, `result[domain][node]`. They satisfy contacts and ranges as far as the bounds and the
+/// linearisations allow, and less after a cancellation.
 pub fn solve(program: &GaitProgram, guess: &GuessSettings, cancel: &dyn Fn() -> bool) -> Vec<Vec<[f64; 9]>> {
     let instants = instants(program);
     let stride = guess.stride_length_m;

@@ -51,7 +51,7 @@ fn geyer<D: Scalar>(coordinate: usize, angle: D) -> D {
     constant::<D>(if coordinate == 5 { PI / 2.0 } else { PI }) - angle
 }
 
-/// What a joint adds to the length of the muscle-tendon unit, m.
+/// Contribution of a joint to the length of the muscle-tendon unit, m.
 pub(crate) fn length_change<D: Scalar>(joint: &Joint, angle: D) -> D {
     let &(coordinate, r0, largest, reference, rho, direction) = joint;
     let phi = geyer(coordinate, angle);

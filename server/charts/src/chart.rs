@@ -76,7 +76,7 @@ const STANCE_ROWS: f64 = 21.0;
 const MARK_GAP: f64 = 6.0;
 /// Width of a character of a name above the chart, at the largest text size.
 const NAME_CHARACTER: f64 = 16.0;
-/// What the bars above a chart are, for its legend.
+/// Meaning of the bars above a chart, for its legend.
 const STANCES: &str = "bar above: stance, then swing; dotted line: foot off";
 /// Smallest value on a logarithmic axis.
 const MIN_LOG_VALUE: f64 = 1e-16;

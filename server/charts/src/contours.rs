@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn grid_without_two_rows_or_with_unknown_values_has_no_line_there() {
+    fn contours_need_two_rows_and_known_values() {
         assert!(contours(&grid(1, 5, |_, column| column)).is_empty());
         assert!(contours(&[]).is_empty());
         let partly = vec![vec![0.0, 1.0, f64::NAN], vec![0.0, 1.0, f64::NAN]];

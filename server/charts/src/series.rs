@@ -55,7 +55,7 @@ pub struct Series {
     pub colour: usize,
     /// Style.
     pub stroke: Stroke,
-    /// What each point leads to on a page; empty if the points are no links.
+    /// Link of each point on a page; empty if the points are no links.
     pub links: Vec<PointLink>,
 }
 

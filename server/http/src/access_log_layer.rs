@@ -231,7 +231,8 @@ fn object(route: &str, path: &str, query: Option<&str>) -> String {
     whole.chars().filter(|c| !c.is_control()).take(MAX_OBJECT).collect()
 }
 
-/// What a path parameter names: the identifiers in it as they stand in the record, or else the text itself, such as a token.
+/// Objects that a path parameter names: the identifiers in it as they stand in the record, or else the text itself, such as
+/// a token.
 fn named_in(parameter: &str) -> Vec<String> {
     let found: Vec<String> = identifiers(parameter).collect();
     if found.is_empty() { vec![parameter.to_owned()] } else { found }

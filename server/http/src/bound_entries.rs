@@ -21,7 +21,7 @@ pub(crate) struct BoundField<'a> {
     name: &'a str,
     /// The numbers that the field can take, in the unit in which the bound is stored.
     range: (f64, f64),
-    /// What follows the angle in the unit of the bound, such as `/s`; `None` if the bound limits no angle.
+    /// Rest of the unit of the bound after the angle, such as `/s`; `None` if the bound limits no angle.
     per: Option<&'static str>,
 }
 

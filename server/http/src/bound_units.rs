@@ -32,7 +32,7 @@ pub(crate) fn in_unit(name: &str, value: f64) -> String {
     with_unit(number(name, value), unit(name))
 }
 
-/// What a bound limits, with its unit: `torso lean, °`; empty for any other name.
+/// Limited quantity of a bound, with its unit: `torso lean, °`; empty for any other name.
 pub(crate) fn meaning(name: &str) -> String {
     match TunedBounds::quantity_of(name) {
         "" => String::new(),

@@ -49,7 +49,7 @@ fn given(fault: &FieldError) -> Option<String> {
     }
 }
 
-/// What a page calls a field that has no label.
+/// Name on a page of a field that has no label.
 pub(crate) const WITHOUT_LABEL: &str = "This entry";
 
 /// A refusal of a field that has no label, because no person fills it in.
@@ -62,7 +62,7 @@ pub(crate) fn without_label(fault: &FieldError) -> String {
     }
 }
 
-/// What was probably meant: the same number in another unit, or with a decimal point in place of a comma.
+/// The entry that was probably meant: the same number in another unit, or with a decimal point in place of a comma.
 fn near_miss(fault: &FieldError) -> Option<String> {
     let number = match fault.value.as_ref()? {
         Value::Number(number) => number.as_f64()?,

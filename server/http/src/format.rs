@@ -99,7 +99,7 @@ pub(crate) fn answer_source(source: AnswerSource) -> &'static str {
     }
 }
 
-/// What simulated walks do in a study; `None` if nothing.
+/// Effect of simulated walks in a study, in words; `None` without any.
 pub(crate) fn simulated_walks(walks: &SimulatedWalks) -> Option<String> {
     let SimulatedWalks { effect, number_of_simulated_walks: number, gait_rmse_tolerance_rad, least_mean_strides } =
         walks;
@@ -114,7 +114,7 @@ pub(crate) fn simulated_walks(walks: &SimulatedWalks) -> Option<String> {
     Some(format!("simulated walks ({number} on each kind of ground): {what}"))
 }
 
-/// What a study waits for besides its solves; empty if it waits for solves only.
+/// The delay of a study besides its solves, in words; empty if it waits for solves only.
 pub(crate) fn also_waits_for(source: AnswerSource) -> &'static str {
     if source == AnswerSource::People { ", plus the time that people need to answer" } else { "" }
 }

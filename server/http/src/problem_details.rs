@@ -29,7 +29,7 @@ pub(super) struct Problem {
     pub(super) title: &'static str,
     /// The HTTP status.
     pub(super) status: u16,
-    /// What went wrong in this request.
+    /// Explanation of the problem in this request.
     pub(super) detail: String,
     /// Name of the field that was refused.
     #[serde(skip_serializing_if = "Option::is_none")]

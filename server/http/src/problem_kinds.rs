@@ -54,7 +54,7 @@ pub(super) struct Entry {
     pub(super) status: StatusCode,
     /// The name for people.
     pub(super) title: &'static str,
-    /// What happened.
+    /// Meaning of the problem.
     pub(super) meaning: &'static str,
     /// How the caller can solve the problem.
     pub(super) remedy: &'static str,

@@ -77,7 +77,7 @@ pub(crate) fn read_form<T: DeserializeOwned>(body: &[u8]) -> Result<T, Error> {
     }
 }
 
-/// What a missing field must be.
+/// The requirement that a missing field does not meet.
 const PRESENT: &str = "present";
 
 /// Reads named values. `what` is the word for one of them.

@@ -113,7 +113,7 @@ impl Units {
         if self == Self::Si { "65.7" } else { "145 lb" }
     }
 
-    /// What can be typed as a height.
+    /// Accepted entries of a height.
     pub(crate) fn height_help(self) -> &'static str {
         if self == Self::Si {
             "1.4 to 2.2, or in feet and inches, such as 5 ft 8 in"
@@ -122,7 +122,7 @@ impl Units {
         }
     }
 
-    /// What can be typed as a body mass.
+    /// Accepted entries of a body mass.
     pub(crate) fn mass_help(self) -> &'static str {
         if self == Self::Si {
             "35 to 160, or in pounds, such as 145 lb"

@@ -14,7 +14,7 @@ use serde_path_to_error::{Path, Segment};
 use std::borrow::Cow;
 use std::fmt;
 
-/// What a structure must be.
+/// The expected form of a structure.
 const OBJECT: &str = "an object with named fields";
 
 /// Maximum length of a value in an error, characters.
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn integer_that_is_too_large_is_told_the_largest_value() {
+    fn too_large_integer_error_states_the_maximum() {
         let refused = super::read::<Vec<u32>>(b"[4294967296]").unwrap_err().to_string();
         assert!(refused.contains("it must be a whole number of at most 4294967295"), "{refused}");
     }

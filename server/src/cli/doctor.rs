@@ -41,7 +41,7 @@ const VALID_SETTINGS: &str = "needs valid settings";
 enum CheckOutcome {
     Good(String),
     Trouble(String),
-    /// The check needs what another one found in trouble.
+    /// Skipped, because a check that it needs failed.
     Skipped(&'static str),
 }
 use CheckOutcome::{Good, Skipped, Trouble};

@@ -40,7 +40,7 @@ pub(super) const WARM_STARTS: [FlagChoice; 2] = [
     ),
 ];
 
-/// What simulated walks can do in a study.
+/// Effects of simulated walks in a study.
 pub(super) const SIMULATED_WALKS: [FlagChoice; 4] = [
     ("none", "No walks are simulated"),
     ("report", "Each gait gets an execution report; trials are not affected"),

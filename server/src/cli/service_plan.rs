@@ -1,5 +1,5 @@
-//! What `gaitwright serve` needs before it opens the record: settings that agree, TLS files and a free address. `gaitwright
-//! doctor` checks the same.
+//! Requirements of `gaitwright serve` before it opens the record: settings that agree, TLS files and a free address.
+//! `gaitwright doctor` checks the same.
 
 use super::settings::Settings;
 #[cfg(feature = "tls")]

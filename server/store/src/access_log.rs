@@ -51,7 +51,7 @@ impl FromStr for AccessKind {
 pub struct Access {
     /// Kind of the access.
     pub kind: AccessKind,
-    /// Who made the request.
+    /// Actor of the request.
     pub actor: String,
     /// Client address; empty for the command line.
     pub address: String,
@@ -91,7 +91,7 @@ pub struct AccessRow {
     pub times: u32,
     /// Kind of the access.
     pub kind: AccessKind,
-    /// Who made the request.
+    /// Actor of the request.
     pub actor: String,
     /// Client address; empty for the command line.
     pub address: String,

@@ -166,7 +166,7 @@ impl Unpacking {
     }
 
     /// Writes a row with the necessary changes: a running study is paused, running solves are queued, and rows get
-    /// sequence numbers of this record. Whatever is recorded afterwards has later times than the row.
+    /// sequence numbers of this record. Later rows get later times.
     ///
     /// # Errors
     /// A violated constraint or trigger; errors of the database.

@@ -8,7 +8,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 use utoipa::ToSchema;
 
-/// What a person states instead of a preference between two gaits.
+/// Statement of a person instead of a preference between two gaits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AssessmentAnswer {
@@ -71,7 +71,7 @@ pub struct Assessment {
     pub trial_b: TrialId,
     /// The answer.
     pub answer: AssessmentAnswer,
-    /// Who answered.
+    /// Source of the answer.
     pub source: Source,
     /// Name or pseudonym of the person who answered.
     pub author: String,

@@ -85,7 +85,7 @@ pub(crate) fn private() -> OpenOptions {
 /// Syncs the folder of a file, so that its name is durable.
 ///
 /// # Errors
-/// What the file system reports.
+/// Errors of the file system.
 pub fn sync_folder(of: &Path) -> io::Result<()> {
     // On other systems folders cannot be opened, and names are durable with their files.
     if cfg!(unix) { File::open(folder_of(of))?.sync_all() } else { Ok(()) }

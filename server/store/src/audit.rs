@@ -10,7 +10,7 @@ pub(super) const ORIGIN: &str = "00000000000000000000000000000000000000000000000
 /// Number of rows read at a time during verification.
 const BATCH: i64 = 1000;
 
-/// Who makes a change.
+/// Actor of a change: a user, a token, or the service itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Actor {
     text: String,
@@ -69,11 +69,11 @@ pub struct AuditRow {
     pub seq: i64,
     /// Time of the change.
     pub created_at: Instant,
-    /// Who made the change.
+    /// Actor of the change.
     pub actor: String,
     /// Kind of change, such as `subject.add` or `study.pause`.
     pub change: String,
-    /// What was changed, such as `study 0190...`.
+    /// Changed object, such as `study 0190...`.
     pub object: String,
     /// Details of the change, with the reason if there is one.
     pub detail: Value,

@@ -37,7 +37,7 @@ pub struct Consent {
     pub kind: ConsentKind,
     /// For consent, the name and version of the signed form. For a withdrawal, the reason, if the subject gave one.
     pub note: String,
-    /// Who recorded it.
+    /// Actor who recorded it.
     pub actor: String,
     /// Time of recording.
     pub created_at: Instant,

@@ -191,7 +191,7 @@ pub enum StoreError {
     Unverified {
         /// The record or the backup.
         path: PathBuf,
-        /// What was found.
+        /// The finding.
         reason: String,
     },
     /// A restore was killed before it was complete.
@@ -257,7 +257,7 @@ pub enum StoreError {
          `gaitwright restore`."
     )]
     UnknownValue {
-        /// What was read.
+        /// Name of the value.
         what: &'static str,
         /// The text.
         text: String,
@@ -273,7 +273,7 @@ impl StoreError {
         Self::UnknownValue { what, text: text.to_owned() }
     }
 
-    /// What was found, for data that are not those of the record: without the advice for a damaged record.
+    /// The finding, for data that are not those of the record: without the advice for a damaged record.
     pub fn finding(&self) -> String {
         match self {
             Self::Damaged { what, reason } => format!("{what}: {reason}"),

@@ -18,7 +18,7 @@ pub struct Import {
     pub trusted: bool,
     /// Number of trials whose Gait RMSE could not be checked, because the archive does not have their gaits.
     pub unchecked_rmse: u32,
-    /// Who imported it.
+    /// Actor of the import.
     pub actor: String,
     /// Time of the import.
     pub imported_at: Instant,

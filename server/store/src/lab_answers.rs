@@ -15,7 +15,7 @@ pub struct LabAnswer {
     pub answer: OrderedAnswer,
     /// Free text.
     pub note: String,
-    /// Who recorded it.
+    /// Actor who recorded it.
     pub actor: String,
     /// Time of recording.
     pub at: Instant,

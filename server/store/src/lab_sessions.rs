@@ -50,7 +50,7 @@ impl FromStr for SessionStep {
 pub struct LabSessionStep {
     /// Reason or note.
     pub note: String,
-    /// Who did it.
+    /// Actor of the step.
     pub actor: String,
     /// Time of the step.
     pub at: Instant,
@@ -69,11 +69,11 @@ pub struct LabSession {
     pub trial_a: TrialId,
     /// The trial with gait B.
     pub trial_b: TrialId,
-    /// What may be known of its allocation.
+    /// The part of its allocation that may be known.
     pub allocation: SessionAllocation,
     /// Free text.
     pub notes: String,
-    /// Who planned it.
+    /// Actor who planned it.
     pub actor: String,
     /// Time of planning.
     pub created_at: Instant,

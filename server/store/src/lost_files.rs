@@ -124,7 +124,7 @@ impl RecordFiles {
 }
 
 impl TrackedFile {
-    /// What happened to the file; `None` if it is intact.
+    /// The loss of the file, in words; `None` if it is intact.
     fn look(&mut self) -> Option<String> {
         let what = self.what;
         match std::fs::metadata(&self.path) {

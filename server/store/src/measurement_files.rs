@@ -58,7 +58,7 @@ pub struct MeasurementFile {
     pub file_name: Option<String>,
     /// SHA-256 of the file.
     pub raw_sha256: String,
-    /// Who uploaded it.
+    /// Actor of the upload.
     pub actor: String,
     /// Time of the upload.
     pub created_at: Instant,

@@ -31,7 +31,7 @@ pub struct Member {
     pub name: String,
     /// Role of a user. Absent for a token.
     pub role: Option<Role>,
-    /// Who added the member.
+    /// Actor who added the member.
     pub added_by: String,
     /// Time at which the member was added.
     pub created_at: Instant,

@@ -56,7 +56,7 @@ pub struct Correction {
     pub body_mass_kg: f64,
     /// Reason for the correction.
     pub reason: String,
-    /// Who corrected it.
+    /// Actor of the correction.
     pub actor: String,
     /// Time of the correction.
     pub created_at: Instant,

@@ -39,7 +39,7 @@ impl ClockState {
 }
 
 static CLOCK: Mutex<Option<ClockState>> = Mutex::new(None);
-/// What [`set_machine_clock`] adds to the clock of the machine, in milliseconds.
+/// Milliseconds that [`set_machine_clock`] adds to the clock of the machine.
 static SET_BY_MS: AtomicI64 = AtomicI64::new(0);
 
 fn machine_ms() -> i64 {

@@ -15,7 +15,7 @@ pub struct Token {
     pub name: String,
     /// Rights of the token.
     pub scopes: Vec<Right>,
-    /// Who created it. The token is revoked when this user is disabled or is no longer an administrator.
+    /// Actor who created it. The token is revoked when this user is disabled or is no longer an administrator.
     pub created_by: String,
     /// Time of creation.
     pub created_at: Instant,

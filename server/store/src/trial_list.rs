@@ -37,9 +37,9 @@ pub const RANGES: [&str; 2 + TunedBounds::COUNT] = {
 pub struct ValueRange {
     /// One of [`RANGES`].
     pub column: &'static str,
-    /// Least value.
+    /// Minimum.
     pub from: f64,
-    /// Greatest value.
+    /// Maximum.
     pub to: f64,
 }
 
@@ -67,9 +67,9 @@ pub struct Listing {
 pub enum ListStart {
     /// With the first trial.
     First,
-    /// After a trial that had this place, whatever became of it since.
+    /// After this place, even if the trial that had it has moved.
     After(TrialPlace),
-    /// So that it ends before a trial that had this place.
+    /// So that it ends before this place, even if the trial that had it has moved.
     Before(TrialPlace),
 }
 

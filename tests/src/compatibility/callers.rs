@@ -1,4 +1,4 @@
-//! Who may call an operation: sessions of each role, and tokens with each set of scopes.
+//! Callers of an operation: sessions of each role, and tokens with each set of scopes.
 
 use gaitwright_store::rights::{Right, Rights, Role};
 use serde_json::Value;

@@ -8,9 +8,9 @@ const CHOICES: [&str; 2] = ["oneOf", "anyOf"];
 pub(super) struct Matched {
     /// Alternatives that correspond.
     pub(super) pairs: Vec<(Value, Value)>,
-    /// What identifies those that only the old schema has.
+    /// Identities of those that only the old schema has.
     pub(super) gone: Vec<String>,
-    /// What identifies those that only the new schema has.
+    /// Identities of those that only the new schema has.
     pub(super) added: Vec<String>,
 }
 

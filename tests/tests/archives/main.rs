@@ -145,7 +145,7 @@ async fn only_a_trusted_signature_confirms_answers_and_an_unsigned_study_is_mark
     let page = other.fetch(&format!("/studies/{study}")).await.text;
     assert!(page.contains("The archive is not signed") && page.contains(&sha256(&turned(&file))), "{page}");
 
-    // Its origin goes with it, further on; and whoever takes it through the service is on record.
+    // A new archive has the earlier imports of the study, and the audit trail has the export.
     let answer = other.fetch_bytes(&format!("/api/v1/studies/{study}/archive")).await;
     assert_eq!(answer.0, StatusCode::OK);
     assert!(other.fetch("/api/v1/audit").await.text.contains("study.export"));

@@ -297,7 +297,7 @@ async fn links_to_files(page: &Tab) -> Vec<(String, bool)> {
     serde_json::from_str(&page.value(links).await).unwrap()
 }
 
-/// What is wrong with a file: no header by which a browser saves it under a name that says what it is.
+/// Fault of a file, if any: no header by which a browser saves it under a name that says what it is.
 async fn not_a_file(site: &Site, address: &str, asks: bool) -> Option<String> {
     let file = site.service.fetch(address).await;
     let header = file.headers.get("content-disposition").map_or("", |value| value.to_str().unwrap());

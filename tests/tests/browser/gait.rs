@@ -188,6 +188,7 @@ async fn browser_lays_other_gaits_over_a_gait_without_scripts() {
     }
     page.click_plainly("#overlay form button").await;
     page.wait_for("#overlay a").await;
+    page.wait_for("footer.foot").await;
     for (group, charts) in [("angles", 7), ("torques", 6), ("powers", 6), ("forces", 2)] {
         assert_eq!(page.count(&format!("#{group} svg.chart")).await, charts, "{group}");
     }

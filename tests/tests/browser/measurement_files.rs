@@ -107,7 +107,7 @@ async fn browser_walks_through_the_steps_of_an_emg_recording_and_rejects_a_strid
 
 /// Signs of a laboratory whose left ankle is positive in plantarflexion.
 const LEFT_ANKLE_REVERSED: [f64; 7] = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0];
-/// What the page says about the left ankle of such a file.
+/// Warning of the page about the left ankle of such a file.
 const DOUBT: &str = "Left ankle moves opposite to normal walking. Is its sign reversed?";
 
 #[tokio::test(flavor = "multi_thread")]

@@ -222,7 +222,7 @@ async fn browser_double_click_of_a_rater_gives_one_answer() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_press_meant_for_the_page_before_answers_nothing() {
+async fn browser_ignores_a_press_from_the_previous_page() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;
@@ -358,7 +358,7 @@ async fn browser_rater_retracts_the_newest_answer_later() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn browser_keys_of_other_fields_answer_nothing_and_can_be_turned_off() {
+async fn browser_answer_keys_do_not_fire_in_other_fields_and_can_be_disabled() {
     let Some(browser) = Chromium::launch().await else { return };
     let site = Site::start(Analytic::default()).await;
     let study = waiting(&site).await;

@@ -9,7 +9,7 @@ pub struct Group {
     pub id: &'static str,
     /// Heading on the page.
     pub heading: &'static str,
-    /// What the figures show, in a sentence; empty: the heading says it.
+    /// Description of the figures, in a sentence; empty if the heading is enough.
     pub hint: String,
     /// Whether pages show the figures only on request.
     pub is_folded: bool,

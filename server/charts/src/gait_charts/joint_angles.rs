@@ -10,7 +10,7 @@ use gait_optimizer::{Gait, ReferenceGait};
 
 /// Colour of a reference gait beside several gaits.
 const REFERENCE: usize = 7;
-/// What a band shows.
+/// Meaning of a band.
 const ONE_DEVIATION: &str = "one standard deviation";
 
 /// An angle with the leg over whose cycle it is drawn, from the heel strike of that leg.

@@ -8,7 +8,7 @@ use crate::Chart;
 use crate::gait_series::Point;
 use gait_optimizer::body::Side;
 
-/// What a group shows of each joint.
+/// Quantity of each joint that a group shows.
 struct JointQuantity {
     id: &'static str,
     heading: &'static str,

@@ -1,4 +1,4 @@
-//! What the charts share in which both legs are compared, as gait laboratories draw them: each leg over its own cycle.
+//! Common parts of the charts that compare both legs, as gait laboratories draw them: each leg over its own cycle.
 
 use super::leg_cycle::{Cycle, Leg};
 use crate::Chart;

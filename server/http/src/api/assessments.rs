@@ -70,7 +70,7 @@ pub(super) async fn create(
 
 /// Get an assessment
 ///
-/// A retracted one too, with its retraction.
+/// Retracted assessments are returned, too, with their retraction.
 #[utoipa::path(
     get,
     path = "/assessments/{id}",

@@ -93,11 +93,11 @@ async fn read(app: &mut AppState, id: StudyId) -> Result<(StudyPlan, StudyAtlas)
     Ok(app.compute(follow).await??)
 }
 
-/// The columns after the action, without those of the gait. Scripts rely on them. Actions with the same number of a gait have
-/// the same gait.
+/// The columns after the action, without those of the gait. Scripts rely on them. Actions with the same gait number share a
+/// gait.
 const COLUMNS: [&str; 4] = ["gait", "trial", "status", "iterations"];
 
-/// The table. Of a gait that the record no longer has, or that is malformed, it has the results of its solve only.
+/// The table. A pruned or malformed gait has solve results only.
 fn table(plan: &StudyPlan, atlas: &StudyAtlas, values: &HashMap<TrialId, GaitValues>) -> CsvTable {
     let mut table = CsvTable::default();
     let bounds = plan.search_space.dimensions().iter().map(|dimension| dimension.name.as_str());

@@ -26,7 +26,7 @@ pub(super) struct ComparedStudy {
     other: Vec<Named<StudyId>>,
 }
 
-/// What a figure of a trial shows.
+/// Gaits in a figure of a trial.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ShownGait {
@@ -38,6 +38,13 @@ pub(super) struct ShownGait {
 /// Download a figure of a study
 ///
 /// Progress, answers, and curves of the recommended gait; with `other`, of all these studies.
+///
+/// Names: `course-gait-rmse-of-the-best-action-by-iteration`; `angles-` and one of `left-hip`, `right-hip`, `left-knee`,
+/// `right-knee-prosthesis`, `left-ankle`, `right-ankle-prosthesis` and `torso-lean`; `limit-cycles-` and one of
+/// `torso-lean`, `left-hip`, `left-knee`, `left-ankle`, `right-hip`, `right-knee` and `right-ankle`; `gait-of-` and the name
+/// of a study; `warm-starts-of-` and the name of the study; `utility-of-the-recommended-gait`. Names of studies are in lower
+/// case, and one hyphen replaces each run of characters other than the letters a to z and digits. A figure without data does
+/// not exist.
 #[utoipa::path(
     get,
     path = "/studies/{id}/figures/{file}",
@@ -45,7 +52,7 @@ pub(super) struct ShownGait {
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "Identifier of the study"),
-        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
+        ("file" = String, Path, description = "Name of the figure, as listed in the OpenAPI description of the operation, with .svg, .png or .csv"),
         ("other" = Option<String>, Query, description = "1 to 5 comma-separated identifiers of studies for comparison")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
@@ -67,6 +74,15 @@ pub(super) async fn of_study(
 ///
 /// While the solve is running, shows its progress. With other trials, shows the joint angles, torques and powers of all of
 /// them, a figure for each joint of each leg. With a local optimum, shows the gait of that one.
+///
+/// Names: `the-stride` and `walking`; `angles-` and `limit-cycles-`, each with `hip`, `knee`, `ankle` or `torso-lean`;
+/// `torques-`, `powers-` and `accelerations-`, each with `hip`, `knee` or `ankle`; `forces-vertical` and `forces-forward`;
+/// `phase-hip-velocity` and `phase-phase`; with muscles, `muscles-`, `muscle-forces-` and `fibres-`, each with `hamstrings`,
+/// `gluteus`, `hip-flexors`, `vasti`, `gastrocnemius`, `soleus` or `tibialis-anterior`;
+/// `solve-violation-dual-infeasibility-barrier-parameter-and-objective`, the only one while the solve is running. With
+/// `other`, only `angles-`, `torques-` and `powers-`, each with `left-hip`, `right-hip`, `left-knee`,
+/// `right-knee-prosthesis`, `left-ankle` or `right-ankle-prosthesis`; and `angles-torso-lean`. With `local_optimum`, only
+/// `the-stride` and `walking`.
 #[utoipa::path(
     get,
     path = "/trials/{id}/figures/{file}",
@@ -74,7 +90,7 @@ pub(super) async fn of_study(
     tag = "figures",
     params(
         ("id" = TrialId, Path, description = "Identifier of the trial"),
-        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
+        ("file" = String, Path, description = "Name of the figure, as listed in the OpenAPI description of the operation, with .svg, .png or .csv"),
         ("other" = Option<String>, Query, description = "1 to 3 comma-separated identifiers of converged trials of the same study with different gaits, which are overlaid on that of this trial"),
         ("local_optimum" = Option<u32>, Query, description = "Number of another local optimum of the trial. Without `other`")
     ),
@@ -100,7 +116,12 @@ pub(super) async fn of_trial(
 
 /// Download a figure of a lab session
 ///
-/// Muscle activity and limit cycles.
+/// Muscle activity, joint angles and limit cycles.
+///
+/// Names: `emg-` and one of `left-rectus-femoris`, `left-tibialis-anterior`, `left-biceps-femoris`, `left-gastrocnemius`,
+/// `right-rectus-femoris` and `right-biceps-femoris`; `angle-` and a joint; `limit-cycle-`, a joint, a hyphen, and
+/// `without-the-device`, `gait-a` or `gait-b`, or `walk-` and the number of the walk as long as its condition is blinded.
+/// Joints are `torso-lean`, `left-hip`, `left-knee`, `left-ankle`, `right-hip`, `right-knee` and `right-ankle`.
 #[utoipa::path(
     get,
     path = "/lab-sessions/{id}/figures/{file}",
@@ -108,7 +129,7 @@ pub(super) async fn of_trial(
     tag = "figures",
     params(
         ("id" = LabSessionId, Path, description = "Identifier of the lab session"),
-        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
+        ("file" = String, Path, description = "Name of the figure, as listed in the OpenAPI description of the operation, with .svg, .png or .csv")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv"))), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -126,6 +147,12 @@ pub(super) async fn of_session(
 /// Download a figure of the posterior
 ///
 /// Effects of the bounds, maps over two bounds, and the trials over the bounds.
+///
+/// Names: `utility-a1-coordinate-velocity-s`, `utility-a2-coordinate-acceleration-s`, `utility-a3-minimum-hip-velocity-m-s`,
+/// `utility-a4-maximum-hip-velocity-m-s`, `utility-a5-swing-foot-clearance-m`, `utility-a6-torso-lean`,
+/// `utility-a7-hip-angle` and `utility-a8-ankle-angle`, for tuned bounds; `trials-by-` and a tuned bound; `x-y-utility` and
+/// `x-y-probability-of-converging`, with the two bounds in place of `x` and `y`; `cost-of-transport-and-gait-rmse`;
+/// `bounds-and-result-of-each-trial`.
 #[utoipa::path(
     get,
     path = "/studies/{id}/analysis/figures/{file}",
@@ -133,7 +160,7 @@ pub(super) async fn of_session(
     tag = "figures",
     params(
         ("id" = StudyId, Path, description = "Identifier of the study"),
-        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv"),
+        ("file" = String, Path, description = "Name of the figure, as listed in the OpenAPI description of the operation, with .svg, .png or .csv"),
         ("x" = Option<String>, Query, description = "Bound on the horizontal axis of a map. The most important one by default"),
         ("y" = Option<String>, Query, description = "Bound on the vertical axis of a map. The second most important one by default")
     ),
@@ -154,6 +181,8 @@ pub(super) async fn of_analysis(
 /// Download a figure of a reference gait
 ///
 /// Joint angles over the cycle of each leg.
+///
+/// Names: `reference-hip`, `reference-knee`, `reference-ankle` and `reference-torso-lean`.
 #[utoipa::path(
     get,
     path = "/reference-gaits/{id}/figures/{file}",
@@ -161,7 +190,7 @@ pub(super) async fn of_analysis(
     tag = "figures",
     params(
         ("id" = ReferenceGaitId, Path, description = "Identifier of the reference gait"),
-        ("file" = String, Path, description = "File name of the figure, as linked on its page, with .svg, .png or .csv")
+        ("file" = String, Path, description = "Name of the figure, as listed in the OpenAPI description of the operation, with .svg, .png or .csv")
     ),
     responses((status = 200, description = "Figure", content((String = "image/svg+xml"), (Binary = "image/png"), (String = "text/csv")))),
     security(("token" = ["read"]), ("session" = ["read"])),

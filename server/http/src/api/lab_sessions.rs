@@ -18,7 +18,7 @@ use gaitwright_store::{LabSessionId, StudyId, lab_sessions, studies};
 use serde::Deserialize;
 use utoipa::ToSchema;
 
-/// What clients see of a session.
+/// The session as clients see it.
 fn view(session: &LabSession) -> LabSessionView {
     lab::LabSessionView::from(session).into()
 }

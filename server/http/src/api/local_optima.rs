@@ -14,9 +14,9 @@ use gaitwright_store::TrialId;
 
 /// List local optima of a trial
 ///
-/// The gaits that the initial guesses of its cold start led to; one of them is the result of the trial. Sorted by number. Each is
-/// a candidate for the root gait of a study: `solve_options.local_optimum_choice` can name its number. Empty after a warm
-/// start, without a gait, and in imported studies.
+/// The gaits to which the initial guesses of the cold start of the trial led; one of them is the result of the trial. Sorted
+/// by number. Each is a candidate for the root gait of a study: `solve_options.local_optimum_choice` can name its number.
+/// Empty after a warm start, without a gait, and in imported studies.
 #[utoipa::path(
     get,
     path = "/trials/{id}/local-optima",

@@ -113,7 +113,7 @@ fn table(rows: &[feedback::FeedbackRow]) -> CsvTable {
 
 /// Get a preference
 ///
-/// A retracted one too, with its retraction.
+/// Retracted preferences are returned, too, with their retraction.
 #[utoipa::path(
     get,
     path = "/preferences/{id}",

@@ -30,11 +30,11 @@ pub(super) struct SafetyReport {
     id: SafetyReportId,
     /// Trial of the gait.
     trial_id: TrialId,
-    /// Who reported it.
+    /// Author of the report.
     author: String,
     /// Time of the report.
     created_at: Instant,
-    /// What was reported. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell which
+    /// Text of the report. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell which
     /// gait was shown first.
     note: String,
     /// Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. If so, the

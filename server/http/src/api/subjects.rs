@@ -238,7 +238,7 @@ pub(super) async fn muscles(
 
 /// Set measured muscle values of a subject
 ///
-/// New studies use them.
+/// New studies use these values.
 #[utoipa::path(
     put,
     path = "/subjects/{id}/muscles",

@@ -74,7 +74,7 @@ pub(super) async fn create(
 
 /// Get a suggestion
 ///
-/// A retracted one too, with its retraction.
+/// Retracted suggestions are returned, too, with their retraction.
 #[utoipa::path(
     get,
     path = "/suggestions/{id}",

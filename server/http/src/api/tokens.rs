@@ -50,7 +50,7 @@ pub(super) async fn list(
 
 /// Get a token
 ///
-/// A revoked or expired one too. The secret is shown only once, by `create_token`.
+/// Revoked and expired tokens are returned, too. The secret is shown only once, by `create_token`.
 #[utoipa::path(
     get,
     path = "/tokens/{id}",

@@ -104,8 +104,8 @@ impl<'de> Deserialize<'de> for Sort {
         ("state" = Option<TrialState>, Query, description = "Only trials in this state"),
         ("sort" = Option<String>, Query, description = "Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a value come last"),
         ("range" = Option<String>, Query, description = "Only trials whose value in this column is at least `from` and at most `to`. Trials without a value are left out"),
-        ("from" = Option<f64>, Query, description = "Least value in the column `range`, in the unit of the column. Without it, the range has no lower end"),
-        ("to" = Option<f64>, Query, description = "Greatest value in the column `range`. Without it, the range has no upper end")
+        ("from" = Option<f64>, Query, description = "Minimum in the column `range`, in the unit of the column. Without it, the range has no lower end"),
+        ("to" = Option<f64>, Query, description = "Maximum in the column `range`. Without it, the range has no upper end")
     ),
     responses((status = 200, description = "A page", body = Page<Trial>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),
@@ -140,7 +140,7 @@ pub(super) async fn of_study(
 
 /// Get a trial
 ///
-/// Its action, state, reason and result. Null where there is none yet.
+/// The action, state, reason and result of the trial. Values that do not exist are null.
 #[utoipa::path(
     get,
     path = "/trials/{id}",

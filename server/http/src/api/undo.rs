@@ -19,7 +19,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnswerUndo {
-    /// Who undoes the answer. Defaults to the caller's name.
+    /// Name or pseudonym of the person who undoes the answer. Defaults to the caller's name.
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     author: Option<String>,
@@ -58,7 +58,8 @@ pub(super) async fn preference(
 
 /// Undo an assessment
 ///
-/// As for a preference. A safety report cannot be undone.
+/// Retracts an assessment that was recorded in the last two minutes. If it replaced an answer, a copy of that answer with
+/// the same author is recorded, and counts in its place. An undo cannot be undone, nor can a safety report.
 #[utoipa::path(
     post,
     path = "/assessments/{id}/undo",

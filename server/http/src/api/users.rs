@@ -70,7 +70,7 @@ pub(super) async fn list(
 
 /// Get a user
 ///
-/// A disabled one too.
+/// Disabled users are returned, too.
 #[utoipa::path(
     get,
     path = "/users/{id}",

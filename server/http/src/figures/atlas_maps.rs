@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 /// Value, text and the text below it of a tile.
 type TileContent = (f64, String, String);
-/// What a map shows of a result; `None` without a gait.
+/// The tile of a result in a map; `None` without a gait.
 type Shown<'a> = &'a dyn Fn(AtlasResult<'_>) -> Option<TileContent>;
 
 /// So many active bounds are named in a tile.

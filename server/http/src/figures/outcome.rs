@@ -1,4 +1,4 @@
-//! What a study has found, for charts and pages, computed from its snapshot on the thread pool.
+//! Results of a study, for charts and pages, computed from its snapshot on the thread pool.
 
 use gait_learner::LearnerError;
 use gaitwright_compute::OnPool;
@@ -10,7 +10,7 @@ use gaitwright_service::studies::snapshot::StudySnapshot;
 use gaitwright_store::TrialId;
 use gaitwright_store::studies::{AnswerSource, StudyState};
 
-/// What a study has found.
+/// Results of a study.
 #[derive(Default)]
 pub(crate) struct StudyOutcome {
     /// Whether people answer and nobody has yet, so that the posterior is only the prior.

@@ -11,7 +11,7 @@ pub(crate) fn of_reference(reference: &ReferenceGait) -> Vec<Figure> {
     charts.map(|chart| Figure::chart("reference", chart)).collect()
 }
 
-/// What the figures show.
+/// A description of the figures.
 pub(crate) fn in_words(reference: &ReferenceGait) -> String {
     format!(
         "Each curve begins with the heel strike of its leg; the left foot is taken to strike half a stride after the right foot. {}",

@@ -12,7 +12,7 @@ use gaitwright_store::trials::{Trial, TrialState};
 /// How many of the newest trials are drawn, so that the page stays light.
 pub(crate) const DRAWN: usize = 100;
 
-/// What makes one trial better than another: Gait RMSE if it answers the comparisons, otherwise the mean utility.
+/// Measure by which trials are compared: Gait RMSE if it answers the comparisons, otherwise the mean utility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TrialMeasure {
     GaitRmse,

@@ -129,7 +129,7 @@ impl ComparePage {
         self.typed.answer == value
     }
 
-    /// Who answers, in words; empty if nobody is named yet.
+    /// The person who answers, in words; empty if nobody is named yet.
     fn person(&self) -> String {
         let source = Source::from_str(&self.typed.source).unwrap_or(Source::Subject);
         match self.typed.author.trim() {
@@ -138,7 +138,7 @@ impl ComparePage {
         }
     }
 
-    /// Who retracts an answer: the signed-in user, or else its author.
+    /// The person who retracts an answer: the signed-in user, or else its author.
     fn retractor<'a>(&'a self, saved: &'a SavedAnswer) -> &'a str {
         if self.user.is_empty() { &saved.author } else { &self.user }
     }

@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 /// Why a trial has no gait.
 pub(super) struct NoGait {
-    /// What the end of the solve means.
+    /// Meaning of the end of the solve.
     pub(super) outcome: &'static str,
     /// The explanation, or its progress.
     pub(super) state: ExplanationState,

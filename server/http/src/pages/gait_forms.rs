@@ -1,4 +1,4 @@
-//! What the forms on the page of a gait do: simulate walks, report the gait as unsafe, and review such reports.
+//! Forms on the page of a gait, to simulate walks, to report the gait as unsafe, and to review such reports.
 
 use super::gait::{self, GaitForms};
 use super::safety_review::{ReportFields, ReviewFields};

@@ -1,4 +1,4 @@
-//! What the page of a gait shows first: spatiotemporal parameters, and the distances from reference gaits.
+//! The first values on the page of a gait: spatiotemporal parameters, and the distances from reference gaits.
 
 use crate::format;
 use gait_optimizer::reference_comparison::{ReferenceComparison, compare_with_references};

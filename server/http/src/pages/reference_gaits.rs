@@ -249,7 +249,7 @@ pub(super) async fn import(
     Ok((status, page(&ReferenceGaitsPage { fields, refused, columns, preview, ..empty })?).into_response())
 }
 
-/// What the page shows of a recording.
+/// A recording as the page shows it.
 struct ShownRecording {
     /// The columns and their unit, if they are chosen.
     columns: Option<(ColumnsPage, &'static str)>,

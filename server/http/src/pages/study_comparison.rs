@@ -58,7 +58,7 @@ struct ComparedGait {
     /// The trial and its number.
     trial: Option<(TrialId, u32)>,
     gait_rmse_rad: Option<f64>,
-    /// What people say of the gait, and its figures.
+    /// Answers of people about the gait, and its values, in words.
     words: String,
 }
 
@@ -187,7 +187,7 @@ impl ComparedGait {
     }
 }
 
-/// What the answers of people say of the recommended gait, as the end of a sentence about the study.
+/// The answers of people about the recommended gait, as the end of a sentence about the study.
 fn answers(snapshot: &StudySnapshot, best: Option<&Trial>) -> String {
     match best.map(|trial| preferred(trial, snapshot)) {
         _ if !people_answer(&snapshot.study) => "Gait RMSE answers every comparison".to_owned(),

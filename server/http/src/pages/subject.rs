@@ -84,7 +84,7 @@ impl Correcting {
     }
 }
 
-/// What became of a form of the page; the entries of a refused one.
+/// Outcome of a form of the page, with the entries of a refused one.
 #[derive(Default)]
 enum SentForm {
     #[default]

@@ -19,7 +19,7 @@ pub(crate) struct AccessRow {
     times: u32,
     /// Kind of the access.
     kind: AccessKind,
-    /// Who made the request.
+    /// Actor of the request.
     actor: String,
     /// Client address; empty for the command line.
     address: String,

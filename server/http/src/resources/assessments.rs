@@ -20,7 +20,7 @@ pub(crate) struct Assessment {
     trial_b: TrialId,
     /// The answer.
     answer: AssessmentAnswer,
-    /// Who answered.
+    /// Source of the answer.
     source: Source,
     /// Name or pseudonym of the person who answered.
     author: String,

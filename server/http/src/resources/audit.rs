@@ -14,11 +14,11 @@ pub(crate) struct AuditRow {
     seq: i64,
     /// Time of the change.
     created_at: Instant,
-    /// Who made the change.
+    /// Actor of the change.
     actor: String,
     /// Kind of change, such as `subject.add` or `study.pause`.
     change: String,
-    /// What was changed, such as `study 0190...`.
+    /// Changed object, such as `study 0190...`.
     object: String,
     /// Details of the change, with the reason if there is one.
     #[schema(value_type = document_schemas::AuditDetail)]

@@ -56,7 +56,7 @@ impl From<certificate::Certificate> for Certificate {
     }
 }
 
-/// What a certificate is about, computed from the gait.
+/// Identity of the gait that a certificate is about, computed from the gait.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct CertifiedGait {
     /// SHA-256 of the gait as compact JSON, hexadecimal.
@@ -136,7 +136,7 @@ impl From<certificate::Difference> for CertifiedDifference {
 /// The worst value of a quantity.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct CertificateCheck {
-    /// What was measured.
+    /// Name of the measured quantity.
     name: String,
     /// Unit of the value and the limit; empty if dimensionless.
     unit: String,

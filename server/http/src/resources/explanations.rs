@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 pub(crate) struct BoundAtLimit {
     /// Name of the bound.
     bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     meaning: String,
     /// Value of the bound in the problem.
     value: f64,
@@ -30,7 +30,7 @@ impl From<explanation::BoundAtLimit> for BoundAtLimit {
 pub(crate) struct BoundValue {
     /// Name of the bound.
     bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     meaning: String,
     /// Value of the bound in the problem.
     value: f64,
@@ -87,7 +87,7 @@ impl From<explanation::Conflict> for Conflict {
 pub(crate) struct Relaxation {
     /// Name of the bound.
     bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     meaning: String,
     /// Value of the bound in the problem.
     from: f64,
@@ -118,7 +118,7 @@ impl From<explanation::Relaxation> for Relaxation {
 pub(crate) struct RelaxedBound {
     /// Name of the bound.
     bound: String,
-    /// What it limits, with its unit.
+    /// Limited quantity and its unit.
     meaning: String,
     /// Value of the bound in the problem.
     from: f64,

@@ -15,9 +15,9 @@ pub(crate) struct Preference {
     id: FeedbackId,
     /// Identifier of the study.
     study_id: StudyId,
-    /// What was preferred, in terms of trials.
+    /// Content of the preference, in terms of trials.
     content: PreferenceContent,
-    /// Who or what it came from.
+    /// Source of the answer.
     source: Source,
     /// Name or pseudonym of the person who answered.
     author: String,
@@ -112,7 +112,7 @@ impl PreferenceContent {
 /// Retraction of an answer.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Retraction {
-    /// Who retracted it.
+    /// Author of the retraction.
     author: String,
     /// Reason, never empty.
     reason: String,

@@ -15,7 +15,7 @@ pub(crate) struct Import {
     trusted: bool,
     /// Number of trials whose Gait RMSE could not be checked, because the archive does not have their gaits.
     unchecked_rmse: u32,
-    /// Who imported it.
+    /// Actor of the import.
     actor: String,
     /// Time of the import.
     imported_at: Instant,

@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 pub(crate) struct LabSessionStep {
     /// Reason or note.
     note: String,
-    /// Who completed the step.
+    /// Actor of the step.
     actor: String,
     /// Time of the step.
     created_at: Instant,
@@ -30,7 +30,7 @@ pub(crate) struct ControllerFileDownload {
     walk: u8,
     /// Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
     to_device: bool,
-    /// Who fetched it.
+    /// Actor of the download.
     actor: String,
     /// Time of the download.
     created_at: Instant,
@@ -50,7 +50,7 @@ pub(crate) struct WalkView {
     number: u8,
     /// Condition of the walk. Null while it is blinded.
     condition: Option<WalkCondition>,
-    /// Who recorded the walk, and when. Null if it is not recorded yet.
+    /// Actor and time of the recording of the walk. Null if it is not recorded yet.
     recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
     recorded_after_unblinding: bool,
@@ -85,16 +85,16 @@ pub(crate) struct LabSessionView {
     walks: Vec<WalkView>,
     /// Current answer of the subject. Null if there is none.
     answer: Option<AnswerView>,
-    /// Who unblinded the session, when and why. Null while it is blinded.
+    /// Actor, time and reason of the unblinding. Null while the session is blinded.
     unblinded: Option<LabSessionStep>,
     /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
     /// and then imported.
     allocation_included: bool,
     /// Downloads of the controller files of the walks.
     controller_files: Vec<ControllerFileDownload>,
-    /// Who closed the session, and when. Null while it is open.
+    /// Actor and time of the closing. Null while the session is open.
     closed: Option<LabSessionStep>,
-    /// Who planned the session.
+    /// Actor who planned the session.
     planned_by: String,
     /// Time of planning.
     created_at: Instant,

@@ -20,7 +20,7 @@ pub(crate) struct MeasurementFile {
     file_name: Option<String>,
     /// SHA-256 of the file.
     raw_sha256: String,
-    /// Who uploaded it.
+    /// Actor of the upload.
     actor: String,
     /// Time of the upload.
     created_at: Instant,

@@ -19,7 +19,7 @@ pub(crate) struct Member {
     name: String,
     /// Role of a user. Null for a token.
     role: Option<Role>,
-    /// Who added the member.
+    /// Actor who added the member.
     added_by: String,
     /// Time at which the member was added.
     created_at: Instant,

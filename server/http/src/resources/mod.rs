@@ -1,4 +1,4 @@
-//! What REST serves of rows of the record and of results of the optimiser.
+//! Resources of REST, made from rows of the record and from results of the optimiser.
 //!
 //! A type here has the name that it has in the description, which is mostly that of its row. Handlers import it, and name
 //! the row with its module: `Trial` and `trials::Trial`. Each conversion names every field of the row, so no new column is

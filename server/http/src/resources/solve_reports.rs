@@ -37,7 +37,7 @@ impl From<gait_optimizer::SolveStatus> for SolveStatus {
     }
 }
 
-/// What a solve started from: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial
+/// Starting point of a solve: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial
 /// guesses, after the given warm start did not converge.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -65,7 +65,7 @@ impl From<gait_optimizer::StartedFrom> for StartedFrom {
 pub(crate) struct SolveReport {
     /// How it ended.
     status: SolveStatus,
-    /// What it started from.
+    /// Starting point of the solve.
     started_from: StartedFrom,
     /// Interior-point iterations over all phases.
     #[schema(value_type = u64)]

@@ -100,9 +100,9 @@ pub(crate) struct StudyPlan {
     /// Settings of the learner.
     #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     learner: LearnerSettings,
-    /// Who answers comparisons.
+    /// Source of the answers.
     answer_source: AnswerSource,
-    /// What evaluates trials.
+    /// Evaluation of the trials, by the service or by lab scripts.
     evaluation: Evaluation,
     /// Number of trials.
     number_of_trials: u32,
@@ -114,7 +114,7 @@ pub(crate) struct StudyPlan {
     repeat_results: bool,
     /// The gait from which trials are warm-started.
     warm_start_from: WarmStartFrom,
-    /// What the study does with an atlas.
+    /// Role of the study with an atlas.
     atlas: AtlasRole,
     /// Simulated walks with each gait.
     simulated_walks: SimulatedWalksSetting,

@@ -44,7 +44,7 @@ pub(crate) struct Correction {
     body_mass_kg: f64,
     /// Reason for the correction.
     reason: String,
-    /// Who made the correction.
+    /// Actor of the correction.
     actor: String,
     /// Time of the correction.
     created_at: Instant,
@@ -67,7 +67,7 @@ pub(crate) struct Consent {
     kind: ConsentKind,
     /// For consent, the name and version of the signed form. For a withdrawal, the reason, or `none given`.
     note: String,
-    /// Who recorded it.
+    /// Actor who recorded it.
     actor: String,
     /// Time of recording.
     created_at: Instant,

@@ -22,7 +22,7 @@ pub(crate) struct Suggestion {
     over: TrialId,
     /// Suggested values of all tuned bounds.
     bounds: BTreeMap<String, f64>,
-    /// Who or what it came from.
+    /// Source of the suggestion.
     source: Source,
     /// Name or pseudonym of the author.
     author: String,

@@ -14,7 +14,7 @@ pub(crate) struct Token {
     name: String,
     /// Rights of the token.
     scopes: Vec<Right>,
-    /// Who created it. The token is revoked when this user is disabled or is no longer an administrator.
+    /// Actor who created it. The token is revoked when this user is disabled or is no longer an administrator.
     created_by: String,
     /// Time of creation.
     created_at: Instant,

@@ -102,7 +102,7 @@ fn surprising_answers(snapshot: &StudySnapshot, posterior: &Posterior) -> Result
     Ok(surprising_answers)
 }
 
-/// What is kept of the studies used last, the one used last at the end.
+/// Cached values of the studies used last, the one used last at the end.
 type Recent<T> = Mutex<VecDeque<(StudyId, Arc<Mutex<T>>)>>;
 
 /// Cache of recent posteriors and of the learners that computed them.

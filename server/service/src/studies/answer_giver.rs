@@ -1,4 +1,4 @@
-//! Who gives an answer, as requests and forms say it.
+//! Source of an answer, as requests and forms state it.
 
 use crate::error::Error;
 use gaitwright_store::feedback::Source;
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Who gives an answer: `subject`, the person who walks; `clinician`; `script`, a lab script.
+/// Source of an answer in a request: `subject`, the person who walks; `clinician`; `script`, a lab script.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AnswerGiver {

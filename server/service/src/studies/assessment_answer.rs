@@ -26,7 +26,7 @@ pub struct NewAssessment {
     pub trial_b: TrialId,
     /// The answer. To state which gait is better, record a preference instead.
     pub answer: AssessmentAnswer,
-    /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// Source of the answer: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<AnswerGiver>,

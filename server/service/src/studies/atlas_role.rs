@@ -1,4 +1,4 @@
-//! What a study may do with an atlas.
+//! Possible roles of a study with an atlas.
 
 use crate::error::Error;
 use gaitwright_store::studies::{AnswerSource, AtlasRole, Evaluation, StudyPlan, WarmStartFrom};

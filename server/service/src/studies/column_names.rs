@@ -1,4 +1,4 @@
-//! What the name of a column tells about its content: the side of the body, and the muscle or the joint.
+//! Meaning of the name of a column: the side of the body, and the muscle or the joint.
 
 /// A side of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

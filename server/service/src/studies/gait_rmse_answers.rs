@@ -12,7 +12,7 @@ use gaitwright_store::studies::{AnswerSource, SimulatedWalks};
 /// A computed answer.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ComputedAnswer {
-    /// What it says.
+    /// Content of the answer.
     pub(super) content: FeedbackContent,
     /// Its reason; empty if Gait RMSE alone decided.
     pub(super) note: String,
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn gait_rmse_decides_outside_the_tolerance_and_where_strides_say_nothing() {
+    fn gait_rmse_decides_outside_the_tolerance_and_for_equal_or_unknown_strides() {
         let better = gait(1, 0.60, Some(2.0));
         for (other, new_wins) in [
             (gait(2, 0.65, Some(9.0)), Some(false)),

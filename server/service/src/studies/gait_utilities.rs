@@ -18,8 +18,8 @@ pub struct GaitUtility {
     pub behind: Option<Prediction>,
 }
 
-/// Whether a difference in utility, the larger less the smaller, can be told from none: it is larger than its standard
-/// deviation, so that the order is right with a probability of at least 84 %.
+/// Whether a difference in utility, the larger less the smaller, exceeds its standard deviation. If so, the order is right
+/// with a probability of at least 84 %.
 pub fn is_distinguishable(difference: &Prediction) -> bool {
     difference.mean > difference.standard_deviation
 }

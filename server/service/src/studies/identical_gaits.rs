@@ -11,7 +11,7 @@ const TOLERANCE: f64 = 1e-4;
 /// would be less than what the constraints leave open.
 const TOLERANCE_S: f64 = 1e-4;
 
-/// What identifies the gait of a trial, in whichever study of the subject it was found.
+/// Identity of the gait of a trial, in whichever study of the subject it was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionIdentity {
     known_by: KnownBy,

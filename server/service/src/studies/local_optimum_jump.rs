@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 /// nodes differ from gait to gait, which changes the objective by less.
 const SAME_LOCAL_OPTIMUM: f64 = 5e-3;
 
-/// What people read of the fold that a solve reveals; `None` without one. `trial` is the new trial.
+/// The sentence for a fold that the solve of `trial` reveals; `None` without a fold.
 pub(super) fn in_words(snapshot: &StudySnapshot, trial: &Trial, report: &SolveReport) -> Option<String> {
     if report.status != SolveStatus::Converged {
         return None;

@@ -19,7 +19,7 @@ pub struct NewMember {
     pub name: String,
 }
 
-/// Who can access a study.
+/// Access to a study.
 #[derive(Debug, Clone)]
 pub struct StudyAccess {
     /// Whether only members and administrators can access the study.
@@ -28,7 +28,7 @@ pub struct StudyAccess {
     pub members: Vec<Member>,
 }
 
-/// Reads who can access a study.
+/// Reads the access to a study.
 ///
 /// # Errors
 /// Errors of the database.

@@ -18,7 +18,7 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[schema(as = NewSafetyReport)]
 pub struct NewSafetyReport {
-    /// Who reports: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// Source of the report: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<AnswerGiver>,
@@ -26,7 +26,7 @@ pub struct NewSafetyReport {
     #[serde(default)]
     #[schema(min_length = 1, max_length = 80)]
     pub author: Option<String>,
-    /// What happened, at most 2000 characters.
+    /// Description of the event, at most 2000 characters.
     #[serde(default)]
     #[schema(max_length = 2000)]
     pub note: String,

@@ -21,7 +21,7 @@ use std::collections::HashSet;
 /// Why an atlas cannot be made.
 const NO_ROOT: &str = "The first trial found no gait, so the atlas has no root gait.";
 
-/// What a study needs next.
+/// Next step of a study.
 pub(super) enum PlanningStep {
     Nothing,
     Transition(StudyTransition, String),

@@ -54,7 +54,7 @@ pub struct Answer {
     pub trial_b: TrialId,
     /// Which gait is better.
     pub answer: PairAnswer,
-    /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// Source of the answer: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<AnswerGiver>,

@@ -8,12 +8,12 @@ use gaitwright_store::{AssessmentId, BlindPairId, Instant, LabSessionId, SafetyR
 pub struct ReportedGait {
     /// The trial.
     pub trial: TrialId,
-    /// Who reported it, as shown to people.
+    /// Author of the report, as shown to people.
     pub by: String,
     /// Time of the report.
     pub at: Instant,
-    /// What staff wrote in a report or an assessment. Empty for raters and for the subject in a blinded lab session, whose notes
-    /// could tell which gait was shown first.
+    /// Note of staff in a report or an assessment. Empty for raters and for the subject in a blinded lab session, whose
+    /// notes could tell which gait was shown first.
     pub note: String,
     /// Where it was given.
     pub source: SafetyReportSource,

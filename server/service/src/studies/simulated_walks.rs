@@ -1,4 +1,4 @@
-//! What simulated walks decide in a study: the label of a gait, and comparisons of gaits with nearly the same Gait RMSE.
+//! Decisions by simulated walks in a study: the label of a gait, and comparisons of gaits with nearly the same Gait RMSE.
 
 use super::execution::{MAX_SIMULATED_WALKS, NewExecutionReport};
 use crate::error::Error;

@@ -32,7 +32,7 @@ pub struct StudySnapshot {
     pub version: LogVersion,
     /// Version of the safety reports and reviews, used in the same way.
     pub safety: SafetyVersion,
-    /// What decides which gaits are walkable.
+    /// Facts that decide which gaits are walkable.
     pub grounds: Grounds,
     /// The trials of the atlas from which the study takes gaits, by number; empty without one.
     pub atlas: Arc<[Trial]>,
@@ -181,7 +181,7 @@ impl StudySnapshot {
         log
     }
 
-    /// What the learner observes of an entry of the log. `None` if both trials have the same action.
+    /// An entry of the log as the learner observes it. `None` if both trials have the same action.
     pub fn feedback_for_learner(&self, content: &FeedbackContent) -> Option<Feedback> {
         in_terms_of_actions(content, |id| self.trial(id).map(|trial| trial.action_index))
     }

@@ -26,12 +26,12 @@ pub struct StudyClone {
     /// Whether to solve with muscles.
     #[serde(default)]
     pub muscles: Option<bool>,
-    /// Who answers comparisons.
+    /// Source of the answers.
     #[serde(default)]
     pub answer_source: Option<AnswerSource>,
-    /// What the study does with an atlas. `make` gives the study that makes the atlas of this problem, in which everything that
-    /// does not affect gaits has its own values, and `use` one that takes its gaits from there. Both start every solve from one
-    /// root gait and repeat no results.
+    /// Role of the study with an atlas. `make` gives the study that makes the atlas of this problem, in which everything
+    /// that does not affect gaits has its own values, and `use` one that takes its gaits from there. Both start every solve
+    /// from one root gait and repeat no results.
     #[serde(default)]
     pub atlas: Option<AtlasRole>,
     /// Whether to start the study immediately.

@@ -60,10 +60,10 @@ pub struct NewStudy {
     #[serde(default)]
     #[schema(value_type = study_plan_schemas::LearnerSettingsSchema)]
     pub learner: LearnerSettings,
-    /// Who answers comparisons.
+    /// Source of the answers.
     #[serde(default = "gait_rmse")]
     pub answer_source: AnswerSource,
-    /// What evaluates trials.
+    /// Evaluation of the trials, by the service or by lab scripts.
     #[serde(default = "optimizer")]
     pub evaluation: Evaluation,
     /// Number of trials.
@@ -84,7 +84,7 @@ pub struct NewStudy {
     /// The gait from which trials are warm-started.
     #[serde(default = "incumbent")]
     pub warm_start_from: WarmStartFrom,
-    /// What the study does with an atlas. Anything but `none` needs `root` as `warm_start_from`.
+    /// Role of the study with an atlas. Anything but `none` needs `root` as `warm_start_from`.
     #[serde(default)]
     pub atlas: AtlasRole,
     /// Simulated walks with each gait. By default, the service simulates none.

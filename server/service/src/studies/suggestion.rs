@@ -24,7 +24,7 @@ pub struct NewSuggestion {
     /// Suggested values of tuned bounds, such as `{"a5": 0.026}`. Each must be a value of the search space. Other
     /// bounds keep their values from the trial.
     pub bounds: BTreeMap<String, f64>,
-    /// Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
+    /// Source of the answer: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
     /// `clinician` for any other user.
     #[serde(default)]
     pub source: Option<AnswerGiver>,

@@ -4,7 +4,7 @@ use gaitwright_store::TrialId;
 use gaitwright_store::studies::{SimulatedWalks, SimulatedWalksEffect};
 use gaitwright_store::trials::Trial;
 
-/// What decides a comparison about a gait.
+/// A gait with the values that decide its comparisons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ComparedGait {
     pub(super) trial: TrialId,
@@ -25,7 +25,7 @@ impl ComparedGait {
     }
 }
 
-/// What simulated walks decide about two gaits whose Gait RMSE is nearly the same.
+/// The decision of simulated walks between two gaits whose Gait RMSE is nearly the same.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BrokenTie {
     pub(super) winner: TrialId,

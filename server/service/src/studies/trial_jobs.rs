@@ -80,7 +80,7 @@ impl<J: TrialJob> TrialJobs<J> {
         Self { store, job, queue: Mutex::default(), wake: Notify::new() }
     }
 
-    /// What the jobs do.
+    /// The work of the jobs.
     pub(super) fn job(&self) -> &J {
         &self.job
     }
@@ -123,15 +123,20 @@ impl<J: TrialJob> TrialJobs<J> {
         self.queue().cancel(trial);
     }
 
-    /// Runs forever. `pulse` changes with every change of the record. Calls `changed` after every job, and `through`
-    /// when an ended study has no trial left to work on.
-    pub(super) async fn run(&self, mut pulse: watch::Receiver<u64>, changed: impl Fn(), through: impl Fn(StudyId)) {
+    /// Runs forever. `record_changed` changes with the record. Calls `changed` after every job, and `study_done` when an
+    /// ended study has no trial left to work on.
+    pub(super) async fn run(
+        &self,
+        mut record_changed: watch::Receiver<u64>,
+        changed: impl Fn(),
+        study_done: impl Fn(StudyId),
+    ) {
         let mut first = true;
         // An earlier run may have ended within a job.
         self.queue().end();
         loop {
-            pulse.mark_unchanged();
-            match self.run_next(&mut pulse, &mut first, &through).await {
+            record_changed.mark_unchanged();
+            match self.run_next(&mut record_changed, &mut first, &study_done).await {
                 Ok(true) => {
                     changed();
                     continue;
@@ -141,7 +146,7 @@ impl<J: TrialJob> TrialJobs<J> {
             }
             let retry = self.queue().next_retry();
             tokio::select! {
-                _ = pulse.changed() => {}
+                _ = record_changed.changed() => {}
                 () = self.wake.notified() => {}
                 () = tokio::time::sleep_until(retry.unwrap_or_else(Instant::now).into()), if retry.is_some() => {}
             }
@@ -151,15 +156,15 @@ impl<J: TrialJob> TrialJobs<J> {
     /// Runs the next job. Returns `false` if there is none.
     async fn run_next(
         &self,
-        pulse: &mut watch::Receiver<u64>,
+        record_changed: &mut watch::Receiver<u64>,
         first: &mut bool,
-        through: &impl Fn(StudyId),
+        study_done: &impl Fn(StudyId),
     ) -> Result<bool, Error> {
         self.read_record(*first).await?;
         *first = false;
-        let Some(running) = self.next(through).await? else { return Ok(false) };
+        let Some(running) = self.next(study_done).await? else { return Ok(false) };
         let (trial, request) = (running.trial, running.request.clone());
-        let Err(error) = self.carry_out(running, pulse).await else {
+        let Err(error) = self.carry_out(running, record_changed).await else {
             self.queue().end();
             return Ok(true);
         };
@@ -194,7 +199,7 @@ impl<J: TrialJob> TrialJobs<J> {
 
     /// The next job, which is running from now on. The newest study comes first, because somebody is likely to look at
     /// it soon.
-    async fn next(&self, through: &impl Fn(StudyId)) -> Result<Option<RunningJob<J::Request>>, Error> {
+    async fn next(&self, study_done: &impl Fn(StudyId)) -> Result<Option<RunningJob<J::Request>>, Error> {
         loop {
             let (study, skipped) = {
                 let mut queue = self.queue();
@@ -217,12 +222,16 @@ impl<J: TrialJob> TrialJobs<J> {
                 Err(error) => tracing::error!(job = J::NAME, %study, %error, "cannot choose the next trial of a study"),
             }
             self.queue().remove_study(study);
-            through(study);
+            study_done(study);
         }
     }
 
     /// Carries out a job until it is done, it is cancelled or the subject withdraws consent.
-    async fn carry_out(&self, running: RunningJob<J::Request>, pulse: &mut watch::Receiver<u64>) -> Result<(), Error> {
+    async fn carry_out(
+        &self,
+        running: RunningJob<J::Request>,
+        record_changed: &mut watch::Receiver<u64>,
+    ) -> Result<(), Error> {
         let RunningJob { trial, request, cancelled, .. } = running;
         let study = trials::get(&mut *self.store.read().await?, trial).await?.study_id;
         let mut work = std::pin::pin!(self.job.carry_out(trial, request, cancelled.clone()));
@@ -234,7 +243,7 @@ impl<J: TrialJob> TrialJobs<J> {
                 biased;
                 () = cancelled.cancelled(), if !J::KEEPS_PARTS => return Ok(()),
                 result = &mut work => break result,
-                Ok(()) = pulse.changed() => {}
+                Ok(()) = record_changed.changed() => {}
             }
         };
         match result {

@@ -28,7 +28,7 @@ const FIRST_PAUSE: Duration = Duration::from_millis(10);
 
 const EARLIER: &str = "The result is that of an earlier solve of the same problem.";
 
-/// What a worker and the service computed for a trial.
+/// Values that a worker and the service computed for a trial.
 #[derive(Debug)]
 pub struct Computed<'a> {
     /// The outcome of the solve.

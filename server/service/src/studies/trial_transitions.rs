@@ -42,7 +42,7 @@ pub(super) fn has_state(state: TrialState) -> String {
     format!("has the state \u{201c}{}\u{201d}", state.as_str().replace('_', " "))
 }
 
-/// What happens to the trial, as a participle.
+/// The event of a trial as a participle.
 fn participle(event: TrialEvent) -> &'static str {
     match event {
         TrialEvent::Leased => "started",

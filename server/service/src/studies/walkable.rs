@@ -82,7 +82,7 @@ pub enum NotWalkable {
     ReportedUnsafe {
         /// Number of the trial.
         number: u32,
-        /// Who reported it.
+        /// Author of the report.
         by: String,
     },
     /// Another trial of the subject has the same gait, which has a safety report in force.
@@ -95,7 +95,7 @@ pub enum NotWalkable {
         number: u32,
         /// The other trial, as shown to people.
         other: String,
-        /// Who reported it.
+        /// Author of the report.
         by: String,
     },
     /// The gait has no certificate yet.

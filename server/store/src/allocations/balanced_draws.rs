@@ -90,7 +90,7 @@ mod tests {
         2.0 * (count as f64 - half).powi(2) / half
     }
 
-    /// What the best guesser of a draw knows: the probability of the likelier order.
+    /// Probability of the likelier order of a draw, which the best guesser knows.
     fn best_guess(lead: i64) -> f64 {
         if lead.unsigned_abs() < TOLERANCE { 0.5 } else { 0.75 }
     }

@@ -36,7 +36,7 @@ pub async fn of_session(
     Ok(())
 }
 
-/// What may be known of the allocation of a session.
+/// The part of the allocation of a session that may be known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SessionAllocation {
     /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
@@ -44,7 +44,7 @@ pub struct SessionAllocation {
     pub included: bool,
     /// Whether walk 2 uses gait A; `None` while the session is blinded.
     pub gait_a_first: Option<bool>,
-    /// Who fetched controller files of its walks, in order.
+    /// Downloads of controller files of its walks, in order.
     pub files: Vec<ControllerFileDownload>,
 }
 
@@ -55,7 +55,7 @@ pub struct ControllerFileDownload {
     pub walk: u8,
     /// Whether the device itself fetched the file. If not, the caller may know which gait the walk uses.
     pub to_device: bool,
-    /// Who fetched it.
+    /// Actor of the download.
     pub actor: String,
     /// Time of the download.
     pub at: Instant,

@@ -1,4 +1,4 @@
-//! What an entry of the feedback log says, and where it comes from.
+//! Content and source of an entry of the feedback log.
 
 use crate::trials::Label;
 use crate::{StoreError, StoreResult, TrialId};

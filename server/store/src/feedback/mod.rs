@@ -23,7 +23,7 @@ pub struct FeedbackRow {
     pub study_id: StudyId,
     /// Content of the entry.
     pub content: FeedbackContent,
-    /// Who or what it came from.
+    /// Source of the entry.
     pub source: Source,
     /// Name or pseudonym of the person who answered.
     pub author: String,
@@ -46,7 +46,7 @@ pub struct FeedbackRow {
 /// Retraction of an answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Retraction {
-    /// Who retracted it.
+    /// Author of the retraction.
     pub author: String,
     /// Reason, never empty.
     pub reason: String,

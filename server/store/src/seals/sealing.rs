@@ -67,7 +67,7 @@ pub(in super::super) async fn seal(db: &mut Connection) -> StoreResult<()> {
             let (table, key, event) = (table.to_owned(), key.to_owned(), event.to_owned());
             rows.push(ChangedRow { table, key, event, known: row.try_get(4)? });
         }
-        // What became of a row at last.
+        // The last event of a row decides whether it was deleted.
         if event == RowEvent::Delete.name() {
             deleted.insert(at)
         } else {

@@ -5,7 +5,7 @@ use super::JOINT;
 use super::tables::{Sealed, present};
 use sqlx::AssertSqlSafe;
 
-/// What a trigger saw of a row.
+/// The change of a row that a trigger noted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum RowEvent {
     Insert,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use utoipa::ToSchema;
 
-/// Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study
+/// Source of the answers of a study: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study
 /// waits for them; `both`, Gait RMSE answers, and people can add answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -42,7 +42,7 @@ impl FromStr for AnswerSource {
     }
 }
 
-/// What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report results.
+/// Evaluation of trials: `optimizer`, by the service; `script`, by lab scripts that ask for trials and report results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Evaluation {
@@ -103,9 +103,9 @@ impl FromStr for WarmStartFrom {
     }
 }
 
-/// What a study does with an atlas, which has the gait of every action of a search space: `none`, nothing; `make`, the study
-/// is an atlas, whose trials find the gait of every action; `use`, the study tunes, and takes each gait at once from a finished
-/// atlas of the same problem, if there is one on record.
+/// Role of a study with an atlas, which has the gait of every action of a search space: `none`, no role; `make`, the study
+/// is an atlas, whose trials find the gait of every action; `use`, the study tunes, and takes each gait at once from a
+/// finished atlas of the same problem, if there is one on record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AtlasRole {
@@ -165,9 +165,9 @@ pub struct StudyPlan {
     pub search_space: SearchSpace,
     /// Settings of the learner.
     pub learner: LearnerSettings,
-    /// Who answers comparisons.
+    /// Source of the answers.
     pub answer_source: AnswerSource,
-    /// What evaluates trials.
+    /// Evaluation of the trials, by the service or by lab scripts.
     pub evaluation: Evaluation,
     /// Number of trials.
     pub number_of_trials: u32,
@@ -179,7 +179,7 @@ pub struct StudyPlan {
     pub repeat_results: bool,
     /// The gait from which trials are warm-started.
     pub warm_start_from: WarmStartFrom,
-    /// What the study does with an atlas.
+    /// Role of the study with an atlas.
     pub atlas: AtlasRole,
     /// Simulated walks with each gait.
     pub simulated_walks: SimulatedWalks,

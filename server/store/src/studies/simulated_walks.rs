@@ -1,4 +1,4 @@
-//! What simulated walks do in a study.
+//! Effect of simulated walks in a study.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,4 +1,4 @@
-//! What the evaluation of a trial found.
+//! Label of a trial: the result of its evaluation.
 
 use super::TrialState;
 use crate::{StoreError, StoreResult};

@@ -21,7 +21,7 @@ pub struct NodeVariable {
     pub start: fn(f64) -> f64,
 }
 
-/// What is minimised.
+/// The objective.
 pub enum Cost {
     /// The duration.
     Duration,

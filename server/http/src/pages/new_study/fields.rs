@@ -257,7 +257,7 @@ pub(super) fn learner(name: &str) -> Option<LearnerSettings> {
     }
 }
 
-/// What simulated walks can do: effect, label and explanation.
+/// Effects of simulated walks: effect, label and explanation.
 pub(super) const SIMULATED_WALKS_EFFECTS: [(SimulatedWalksEffect, &str, &str); 4] = [
     (SimulatedWalksEffect::None, "Nothing", "walks are simulated only on request, on the page of a gait"),
     (SimulatedWalksEffect::Report, "Report", "each gait gets an execution report; trials are not affected"),

@@ -150,7 +150,7 @@ impl NewStudyPage {
     }
 }
 
-/// What to fill in.
+/// Values with which the form is filled in.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Preset {

@@ -87,7 +87,7 @@ fn subject_of(fields: &NewStudyFields) -> Result<StudySubject, Error> {
     }))
 }
 
-/// What the form does not show comes from the cloned study.
+/// The study that the form describes. Values that the form does not show come from the cloned study.
 fn study_of(
     fields: &NewStudyFields,
     editor: &SpaceEditor,
@@ -171,7 +171,7 @@ fn simulated_walks(fields: &NewStudyFields) -> Result<SimulatedWalksSetting, Err
     })
 }
 
-/// What the field of a local optimum accepts.
+/// Accepted entries of the field of a local optimum.
 const LOCAL_OPTIMUM: &str = "a whole number from 1, or empty, and empty beside an objective tolerance";
 
 fn initial_guesses(fields: &NewStudyFields) -> Result<usize, Error> {

@@ -12,7 +12,7 @@ use gaitwright_store::feedback::{FeedbackContent, Source};
 use gaitwright_store::trials::Trial;
 use gaitwright_store::{Connection, StoreResult, TrialId, certificates, gaits};
 
-/// What the record says of the recommended gait beside its trial.
+/// Findings about the recommended gait besides its trial: certificates and simulated walks.
 pub(super) struct BestFindings {
     /// The states of the certificates.
     pub(super) certification: BestCertification,

@@ -204,7 +204,7 @@ pub(super) async fn read_live(
     Ok(live)
 }
 
-/// What the learner says of a study.
+/// Results of the learner for a study.
 struct Learned {
     outcome: StudyOutcome,
     certainty: Option<String>,

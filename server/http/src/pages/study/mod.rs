@@ -58,7 +58,7 @@ struct StudyPage {
     last_event: i64,
     variant: &'static str,
     answer_source: &'static str,
-    /// What simulated walks do; `None` if nothing.
+    /// Effect of simulated walks, in words; `None` without any.
     simulated_walks: Option<String>,
     may_administer: bool,
     /// Imports; empty if the study was created here.

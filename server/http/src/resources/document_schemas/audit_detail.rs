@@ -14,8 +14,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// What exactly was changed. The fields depend on the kind of change. A field whose description names no kind
-/// occurs with several kinds.
+/// Details of a change. The fields depend on the kind of change. A field whose description names no kind occurs with several
+/// kinds.
 #[derive(Debug, ToSchema)]
 pub(crate) struct AuditDetail {
     /// `trial.ask`: true if the script was given its open trial again.

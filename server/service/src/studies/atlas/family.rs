@@ -1,4 +1,4 @@
-//! What the solves of an atlas have in common.
+//! Common values of the solves of an atlas.
 
 use gait_optimizer::{GaitProblem, SolveOptions, WarmStart};
 

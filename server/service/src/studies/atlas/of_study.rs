@@ -38,7 +38,7 @@ pub fn atlas_of(study: NewStudy) -> NewStudy {
     }
 }
 
-/// What an atlas needs next.
+/// Next step of an atlas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) enum AtlasStep {
     /// A solve of this action.
@@ -76,7 +76,7 @@ pub(super) struct Replay<'a> {
     pub(super) trials: Vec<&'a Trial>,
     /// For how many actions each of them is the first solve.
     pub(super) served: Vec<u64>,
-    /// What comes next.
+    /// Next step.
     pub(super) next: AtlasStep,
 }
 

@@ -1,4 +1,4 @@
-//! What the atlas keeps of a solve.
+//! The values of a solve that the atlas keeps.
 
 use super::gait_values::GaitValues;
 use crate::error::Error;

@@ -288,7 +288,7 @@ pub async fn retract(writer: &mut Writer, caller: &Caller, code: &str) -> Result
 /// Whether the answer can be retracted: it is the rater's last one and not a safety report.
 ///
 /// # Errors
-/// What the record reports.
+/// Errors of the database.
 pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<bool, Error> {
     let all = blind_pairs::of_study(db, shown.study_id).await?;
     let last = !all.iter().any(|other| other.rater == shown.rater && other.number > shown.number);
@@ -302,7 +302,7 @@ pub async fn can_be_retracted(db: &mut Connection, shown: &BlindPair) -> Result<
 /// The pair of a code with its sides, if it belongs to this rater and the rater can access its study.
 ///
 /// # Errors
-/// What the record reports, and [`Error::NotFound`] for a code that is not of this rater.
+/// [`Error::NotFound`] for a code that is not of this rater; errors of the database.
 pub async fn own(db: &mut Connection, caller: &Caller, code: &str) -> Result<PairWithSides, Error> {
     let shown = own_pair(db, caller, code).await?;
     if !accessible_studies::reaches(db, caller.reach(), shown.pair.study_id).await? {

@@ -22,7 +22,7 @@ pub struct AnswerView {
     pub answer: OrderedAnswer,
     /// Free text.
     pub note: String,
-    /// Who recorded it.
+    /// Actor who recorded it.
     pub actor: String,
     /// Time of recording.
     pub created_at: Instant,

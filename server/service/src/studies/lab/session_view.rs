@@ -66,7 +66,7 @@ pub struct WalkView {
     pub number: u8,
     /// Condition of the walk. Absent while it is blinded.
     pub condition: Option<WalkCondition>,
-    /// Who recorded the walk, and when.
+    /// Actor and time of the recording of the walk.
     pub recorded: Option<LabSessionStep>,
     /// Whether it was recorded after unblinding, or by a user who had fetched a controller file.
     pub recorded_after_unblinding: bool,
@@ -93,16 +93,16 @@ pub struct LabSessionView {
     pub walks: Vec<WalkView>,
     /// Current answer of the subject. Absent if there is none.
     pub answer: Option<AnswerView>,
-    /// Who unblinded the session, when and why. Absent while it is blinded.
+    /// Actor, time and reason of the unblinding. Absent while the session is blinded.
     pub unblinded: Option<LabSessionStep>,
     /// Whether the allocation is in this record. It is missing if the study was exported while the session was blinded,
     /// and then imported.
     pub allocation_included: bool,
-    /// Who fetched controller files of the walks.
+    /// Downloads of controller files of the walks.
     pub controller_files: Vec<ControllerFileDownload>,
-    /// Who closed the session, and when.
+    /// Actor and time of the closing.
     pub closed: Option<LabSessionStep>,
-    /// Who planned the session.
+    /// Actor who planned the session.
     pub planned_by: String,
     /// Time of planning.
     pub created_at: Instant,

@@ -218,7 +218,7 @@ pub async fn check_kept(db: &mut Connection, pool: &Pool, kept: &MeasurementFile
 /// A measurement file as uploaded, byte for byte.
 #[derive(Debug)]
 pub struct UploadedFile {
-    /// What is known of it.
+    /// Its row in the record.
     pub recording: MeasurementFile,
     /// Its format.
     pub format: MeasurementFormat,

@@ -23,7 +23,7 @@ use std::collections::HashMap;
 use std::sync::atomic::AtomicU32;
 use std::time::Instant;
 
-/// What became of the result of an attempt.
+/// Outcome of recording the result of an attempt.
 enum Recorded {
     /// It is on record, or does not count.
     Done,

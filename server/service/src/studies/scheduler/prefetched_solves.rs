@@ -30,7 +30,7 @@ struct Prefetch {
     promised_to: Option<Attempt>,
 }
 
-/// What was prefetched for an attempt.
+/// State of the prefetched solve of an attempt.
 #[derive(Debug)]
 pub(super) enum Prepared {
     /// Nothing.

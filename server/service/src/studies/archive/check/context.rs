@@ -1,4 +1,4 @@
-//! What the checks of an imported archive share.
+//! Common context of the checks of an imported archive.
 
 use super::super::archive_file::refuse;
 use crate::error::Error;
@@ -16,7 +16,7 @@ pub(super) struct Context {
     pub(super) reference: ReferenceGait,
 }
 
-/// What a check found wrong in an archive. The rows are checked in a record of their own, so advice for the record of the
+/// A fault that a check found in an archive. The rows are checked in a record of their own, so advice for the record of the
 /// service does not belong in it.
 pub(super) trait Finding {
     fn finding(&self) -> String;
