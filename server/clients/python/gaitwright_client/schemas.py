@@ -10,23 +10,23 @@ from typing import Any, Literal, Optional, TypedDict, Union
 # Kind of access: `view`, data were shown; `export`, data were downloaded as a file; `refused`, the request was refused.
 AccessKind = Literal["view", "export", "refused"]
 
-# Who gives an answer: `subject`, the person who walks; `clinician`; `script`, a lab script.
+# Source of an answer in a request: `subject`, the person who walks; `clinician`; `script`, a lab script.
 AnswerGiver = Literal["subject", "clinician", "script"]
 
 # Identifier of an answer to a comparison: of a preference or of an assessment.
 AnswerId = str
 
-# Who answers comparisons: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the study waits
-# for them; `both`, Gait RMSE answers, and people can add answers.
+# Source of the answers of a study: `gait_rmse`, Gait RMSE answers every comparison; `people`, people answer, and the
+# study waits for them; `both`, Gait RMSE answers, and people can add answers.
 AnswerSource = Literal["gait_rmse", "people", "both"]
 
-# What a person states instead of a preference between two gaits.
+# Statement of a person instead of a preference between two gaits.
 AssessmentAnswer = Literal["cannot_tell", "unsafe_a", "unsafe_b", "unsafe_both"]
 
 # Identifier of an assessment.
 AssessmentId = str
 
-# What a study does with an atlas, which has the gait of every action of a search space: `none`, nothing; `make`, the
+# Role of a study with an atlas, which has the gait of every action of a search space: `none`, no role; `make`, the
 # study is an atlas, whose trials find the gait of every action; `use`, the study tunes, and takes each gait at once
 # from a finished atlas of the same problem, if there is one on record.
 AtlasRole = Literal["none", "make", "use"]
@@ -64,7 +64,7 @@ DeviceId = str
 # Identifier of a result of EMG processing.
 EmgResultId = str
 
-# What evaluates trials: `optimizer`, the service; `script`, lab scripts that ask for trials and report results.
+# Evaluation of trials: `optimizer`, by the service; `script`, by lab scripts that ask for trials and report results.
 Evaluation = Literal["optimizer", "script"]
 
 # Identifier of an entry of the feedback of a study.
@@ -175,7 +175,7 @@ SolveStatus = Literal["converged", "infeasible", "stalled", "iteration_limit", "
 # wins; `subject` and `clinician`, a person; `script`, a lab script.
 Source = Literal["evaluation", "gait_rmse", "subject", "clinician", "script"]
 
-# What a solve started from: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial guesses,
+# Starting point of a solve: `cold`, initial guesses; `warm`, the given warm start; `cold_after_warm`, initial guesses,
 # after the given warm start did not converge.
 StartedFrom = Literal["cold", "warm", "cold_after_warm"]
 
@@ -224,7 +224,7 @@ WarmStartFrom = Literal["incumbent", "root"]
 class AccessLogEntry(TypedDict):
     """Entry of the access log."""
 
-    # Who made the request.
+    # Actor of the request.
     actor: str
     # Client address; empty for the command line.
     address: str
@@ -286,7 +286,7 @@ class AnswerRetraction(_AnswerRetractionRequired, total=False):
 class AnswerUndo(TypedDict, total=False):
     """Request to undo an answer."""
 
-    # Who undoes the answer. Defaults to the caller's name.
+    # Name or pseudonym of the person who undoes the answer. Defaults to the caller's name.
     author: Optional[str]
 
 
@@ -319,7 +319,7 @@ class Assessment(TypedDict):
     restores: Optional[AssessmentId]
     # Retraction. Null if the assessment was not retracted.
     retraction: Optional[Retraction]
-    # Who answered.
+    # Source of the answer.
     source: Source
     # Identifier of the study.
     study_id: StudyId
@@ -532,7 +532,7 @@ AuditDetail = TypedDict(
 class AuditEntry(TypedDict):
     """Entry of the audit trail."""
 
-    # Who made the change.
+    # Actor of the change.
     actor: str
     # Kind of change, such as `subject.add` or `study.pause`.
     change: str
@@ -542,7 +542,7 @@ class AuditEntry(TypedDict):
     detail: AuditDetail
     # Hash over this row and the hash of the previous row.
     hash: str
-    # What was changed, such as `study 0190...`.
+    # Changed object, such as `study 0190...`.
     object: str
     # Hash of the previous row.
     previous: str
@@ -656,7 +656,7 @@ class BoundAtLimit(TypedDict):
     bound: str
     # Domains in which the bound is active; `stride` for a constraint on the whole stride.
     domains: list[str]
-    # What it limits, with its unit.
+    # Limited quantity and its unit.
     meaning: str
     # Value of the bound in the problem.
     value: float
@@ -667,7 +667,7 @@ class BoundValue(TypedDict):
 
     # Name of the bound.
     bound: str
-    # What it limits, with its unit.
+    # Limited quantity and its unit.
     meaning: str
     # Value of the bound in the problem.
     value: float
@@ -734,7 +734,7 @@ class CertificateCheck(TypedDict):
 
     # Largest allowed value. Null if the value is only reported.
     limit: Optional[float]
-    # What was measured.
+    # Name of the measured quantity.
     name: str
     # Domain and time of the worst value.
     place: str
@@ -756,7 +756,7 @@ class CertifiedDifference(TypedDict):
 
 
 class CertifiedGait(TypedDict):
-    """What a certificate is about, computed from the gait."""
+    """Identity of the gait that a certificate is about, computed from the gait."""
 
     # Mechanical cost of transport, from absolute joint powers; dimensionless. It is computed from the gait, and so is
     # that of its trial.
@@ -825,7 +825,7 @@ class Conflict(_ConflictRequired, total=False):
 class Consent(TypedDict):
     """A subject's consent, or withdrawal of consent. The newest entry applies."""
 
-    # Who recorded it.
+    # Actor who recorded it.
     actor: str
     # Time of recording.
     created_at: Instant
@@ -912,7 +912,7 @@ class ControllerFile(_ControllerFileRequired, total=False):
 class ControllerFileDownload(TypedDict):
     """Download of the controller file of a walk."""
 
-    # Who fetched it.
+    # Actor of the download.
     actor: str
     # Time of the download.
     created_at: Instant
@@ -934,7 +934,7 @@ class ControllerOutput(TypedDict):
 class Correction(TypedDict):
     """Correction of height and mass."""
 
-    # Who made the correction.
+    # Actor of the correction.
     actor: str
     # Corrected body mass, kg.
     body_mass_kg: float
@@ -959,7 +959,7 @@ class Preference(TypedDict):
     author: str
     # Whether it comes from a rater's blind comparison.
     by_rater: bool
-    # What was preferred, in terms of trials.
+    # Content of the preference, in terms of trials.
     content: PreferenceContent
     # Whether the rater could have known the allocation. If so, it does not count as blind.
     could_have_known: bool
@@ -978,7 +978,7 @@ class Preference(TypedDict):
     retraction: Optional[Retraction]
     # Sequence number.
     seq: int
-    # Who or what it came from.
+    # Source of the answer.
     source: Source
     # Identifier of the study.
     study_id: StudyId
@@ -1005,7 +1005,7 @@ class Token(TypedDict):
 
     # Time of creation.
     created_at: Instant
-    # Who created it. The token is revoked when this user is disabled or is no longer an administrator.
+    # Actor who created it. The token is revoked when this user is disabled or is no longer an administrator.
     created_by: str
     # Time of expiry. Null if it does not expire.
     expires_at: Optional[Instant]
@@ -1517,7 +1517,7 @@ class HistoryEntry(TypedDict):
 class Import(TypedDict):
     """Import of a study."""
 
-    # Who imported it.
+    # Actor of the import.
     actor: str
     # SHA-256 of the archive.
     file_sha256: str
@@ -1613,7 +1613,7 @@ class JointRelaxation(TypedDict):
 class LabAnswer(TypedDict):
     """The subject's answer, in terms of walks."""
 
-    # Who recorded it.
+    # Actor who recorded it.
     actor: str
     # The answer. First is walk 2, second is walk 3.
     answer: OrderedAnswer
@@ -1636,7 +1636,7 @@ class LabSession(TypedDict):
     allocation_included: bool
     # Current answer of the subject. Null if there is none.
     answer: Optional[LabAnswer]
-    # Who closed the session, and when. Null while it is open.
+    # Actor and time of the closing. Null while the session is open.
     closed: Optional[LabSessionStep]
     # Downloads of the controller files of the walks.
     controller_files: list[ControllerFileDownload]
@@ -1648,7 +1648,7 @@ class LabSession(TypedDict):
     notes: str
     # Number of the session in this study, from 1.
     number: int
-    # Who planned the session.
+    # Actor who planned the session.
     planned_by: str
     # State of the session.
     state: LabSessionState
@@ -1658,7 +1658,7 @@ class LabSession(TypedDict):
     trial_a: TrialId
     # The trial with gait B.
     trial_b: TrialId
-    # Who unblinded the session, when and why. Null while it is blinded.
+    # Actor, time and reason of the unblinding. Null while the session is blinded.
     unblinded: Optional[LabSessionStep]
     # The three walks.
     walks: list[WalkView]
@@ -1698,7 +1698,7 @@ class LabSessionProgress(TypedDict):
 class LabSessionStep(TypedDict):
     """Completed step of a session."""
 
-    # Who completed the step.
+    # Actor of the step.
     actor: str
     # Time of the step.
     created_at: Instant
@@ -1842,7 +1842,7 @@ class LocalOptimum(TypedDict):
 class MeasurementFile(TypedDict):
     """Measurement file, without its content."""
 
-    # Who uploaded it.
+    # Actor of the upload.
     actor: str
     # Time of the upload.
     created_at: Instant
@@ -1863,7 +1863,7 @@ class MeasurementFile(TypedDict):
 class Member(TypedDict):
     """Member of a study."""
 
-    # Who added the member.
+    # Actor who added the member.
     added_by: str
     # Time at which the member was added.
     created_at: Instant
@@ -2100,8 +2100,8 @@ class NewAssessment(_NewAssessmentRequired, total=False):
     # Identifier of the preference or assessment that this assessment replaces: a person's answer about the same two
     # trials, which then no longer counts. If this assessment is undone, the replaced one counts again.
     replaces: Optional[AnswerId]
-    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
-    # `clinician` for any other user.
+    # Source of the answer: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater,
+    # and `clinician` for any other user.
     source: Optional[AnswerGiver]
 
 
@@ -2217,8 +2217,8 @@ class NewPreference(_NewPreferenceRequired, total=False):
     # Identifier of the preference or assessment that this answer replaces: a person's answer about the same two trials,
     # which then no longer counts. If this answer is undone, the replaced one counts again.
     replaces: Optional[AnswerId]
-    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
-    # `clinician` for any other user.
+    # Source of the answer: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater,
+    # and `clinician` for any other user.
     source: Optional[AnswerGiver]
 
 
@@ -2269,10 +2269,10 @@ class NewSafetyReport(TypedDict, total=False):
 
     # Name or pseudonym of the author. Defaults to the caller's name.
     author: Optional[str]
-    # What happened, at most 2000 characters.
+    # Description of the event, at most 2000 characters.
     note: str
-    # Who reports: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
-    # `clinician` for any other user.
+    # Source of the report: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater,
+    # and `clinician` for any other user.
     source: Optional[AnswerGiver]
 
 
@@ -2302,15 +2302,15 @@ class _NewStudyRequired(TypedDict):
 class NewStudy(_NewStudyRequired, total=False):
     """A study to create. Every field except the subject has a default."""
 
-    # Who answers comparisons.
+    # Source of the answers.
     answer_source: AnswerSource
-    # What the study does with an atlas. Anything but `none` needs `root` as `warm_start_from`.
+    # Role of the study with an atlas. Anything but `none` needs `root` as `warm_start_from`.
     atlas: AtlasRole
     # Values of the bounds that are not tuned.
     base_bounds: BaseBounds
     # Identifier of the device. The built-in one by default.
     device_id: Optional[DeviceId]
-    # What evaluates trials.
+    # Evaluation of the trials, by the service or by lab scripts.
     evaluation: Evaluation
     # Settings of the gait problem. If they contain no `muscles`, the measured muscle values of the subject apply.
     gait_settings: GaitSettings
@@ -2384,8 +2384,8 @@ class NewSuggestion(_NewSuggestionRequired, total=False):
     author: Optional[str]
     # Free text.
     note: str
-    # Who answers: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater, and
-    # `clinician` for any other user.
+    # Source of the answer: `subject`, `clinician` or `script`. By default `script` for a token, `subject` for a rater,
+    # and `clinician` for any other user.
     source: Optional[AnswerGiver]
 
 
@@ -2489,7 +2489,7 @@ class PrimalDualPoint(TypedDict):
 
 
 class _ProblemRequired(TypedDict):
-    # What went wrong in this request.
+    # Explanation of the problem in this request.
     detail: str
     # The HTTP status.
     status: int
@@ -2705,7 +2705,7 @@ Relaxation = TypedDict(
         "bound": "str",
         # Value of the bound in the problem.
         "from": "float",
-        # What it limits, with its unit.
+        # Limited quantity and its unit.
         "meaning": "str",
         # The loosest value tried that does not give a gait.
         "not_with": "float",
@@ -2728,7 +2728,7 @@ RelaxedBound = TypedDict(
         "bound": "str",
         # Value of the bound in the problem.
         "from": "float",
-        # What it limits, with its unit.
+        # Limited quantity and its unit.
         "meaning": "str",
         # The loosest value that does not give a gait together with the others.
         "not_with": "float",
@@ -2769,7 +2769,7 @@ class ResultDerivatives(TypedDict):
 class Retraction(TypedDict):
     """Retraction of an answer."""
 
-    # Who retracted it.
+    # Author of the retraction.
     author: str
     # Time of the retraction.
     created_at: Instant
@@ -2805,7 +2805,7 @@ class ReturnMap(TypedDict):
 class SafetyReport(TypedDict):
     """Safety report about a gait."""
 
-    # Who reported it.
+    # Author of the report.
     author: str
     # Time of the report.
     created_at: Instant
@@ -2815,7 +2815,7 @@ class SafetyReport(TypedDict):
     # Whether the report is in force: it awaits a review, or a review confirmed that the gait is unsafe. If so, the gait
     # must not be used for walking.
     in_force: bool
-    # What was reported. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell
+    # Text of the report. Empty for reports of raters and of subjects in blinded lab sessions, whose notes could tell
     # which gait was shown first.
     note: str
     # Newest review. Null while the report awaits review.
@@ -3079,7 +3079,7 @@ class SolveReport(TypedDict):
     solver_runs: list[SolverRun]
     # Mean walking speed, m/s.
     speed_m_s: float
-    # What it started from.
+    # Starting point of the solve.
     started_from: StartedFrom
     # How it ended.
     status: SolveStatus
@@ -3138,9 +3138,9 @@ class StridesOnYield(TypedDict):
 class StudyPlan(TypedDict):
     """Set-up of a study."""
 
-    # Who answers comparisons.
+    # Source of the answers.
     answer_source: AnswerSource
-    # What the study does with an atlas.
+    # Role of the study with an atlas.
     atlas: AtlasRole
     # Values of bounds that are not tuned.
     base_bounds: Bounds
@@ -3148,7 +3148,7 @@ class StudyPlan(TypedDict):
     body: BodyMeasures
     # Identifier of the device.
     device_id: DeviceId
-    # What evaluates trials.
+    # Evaluation of the trials, by the service or by lab scripts.
     evaluation: Evaluation
     # Settings of the gait problem.
     gait_settings: GaitSettings
@@ -3237,11 +3237,11 @@ class StudyChange(TypedDict, total=False):
 class StudyClone(TypedDict, total=False):
     """A new study with the set-up of another one. Absent fields are copied."""
 
-    # Who answers comparisons.
+    # Source of the answers.
     answer_source: Optional[AnswerSource]
-    # What the study does with an atlas. `make` gives the study that makes the atlas of this problem, in which
-    # everything that does not affect gaits has its own values, and `use` one that takes its gaits from there. Both
-    # start every solve from one root gait and repeat no results.
+    # Role of the study with an atlas. `make` gives the study that makes the atlas of this problem, in which everything
+    # that does not affect gaits has its own values, and `use` one that takes its gaits from there. Both start every
+    # solve from one root gait and repeat no results.
     atlas: Optional[AtlasRole]
     # Whether to solve with muscles.
     muscles: Optional[bool]
@@ -3347,7 +3347,7 @@ class Suggestion(TypedDict):
     retraction: Optional[Retraction]
     # Sequence number.
     seq: int
-    # Who or what it came from.
+    # Source of the suggestion.
     source: Source
     # Identifier of the study.
     study_id: StudyId
@@ -3633,7 +3633,7 @@ class WalkView(TypedDict):
     condition: Optional[WalkCondition]
     # Number of the walk, 1 to 3.
     number: int
-    # Who recorded the walk, and when. Null if it is not recorded yet.
+    # Actor and time of the recording of the walk. Null if it is not recorded yet.
     recorded: Optional[LabSessionStep]
     # Whether it was recorded after unblinding, or by a user who had fetched a controller file.
     recorded_after_unblinding: bool

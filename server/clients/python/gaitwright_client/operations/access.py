@@ -189,7 +189,7 @@ class AccessMethods(Transport):
     def get_token(self, token_id: TokenId) -> Token:
         """Get a token.
 
-        A revoked or expired one too. The secret is shown only once, by `create_token`.
+        Revoked and expired tokens are returned, too. The secret is shown only once, by `create_token`.
         """
         return cast(Token, self.request_json("GET", "/api/v1/tokens/{id}", {"id": token_id}))
 
@@ -227,7 +227,7 @@ class AccessMethods(Transport):
     def get_user(self, user_id: UserId) -> User:
         """Get a user.
 
-        A disabled one too.
+        Disabled users are returned, too.
         """
         return cast(User, self.request_json("GET", "/api/v1/users/{id}", {"id": user_id}))
 

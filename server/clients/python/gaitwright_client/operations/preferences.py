@@ -38,7 +38,7 @@ class PreferencesMethods(Transport):
     def get_assessment(self, assessment_id: AssessmentId) -> Assessment:
         """Get an assessment.
 
-        A retracted one too, with its retraction.
+        Retracted assessments are returned, too, with their retraction.
         """
         return cast(Assessment, self.request_json("GET", "/api/v1/assessments/{id}", {"id": assessment_id}))
 
@@ -75,7 +75,9 @@ class PreferencesMethods(Transport):
     ) -> RestoredAnswer:
         """Undo an assessment.
 
-        As for a preference. A safety report cannot be undone.
+        Retracts an assessment that was recorded in the last two minutes. If it replaced an answer, a copy of that
+        answer with the same author is recorded, and counts in its place. An undo cannot be undone, nor can a safety
+        report.
 
         Fields: optionally author.
         """
@@ -93,7 +95,7 @@ class PreferencesMethods(Transport):
     def get_preference(self, preference_id: FeedbackId) -> Preference:
         """Get a preference.
 
-        A retracted one too, with its retraction.
+        Retracted preferences are returned, too, with their retraction.
         """
         return cast(Preference, self.request_json("GET", "/api/v1/preferences/{id}", {"id": preference_id}))
 
@@ -261,7 +263,7 @@ class PreferencesMethods(Transport):
     def get_suggestion(self, suggestion_id: FeedbackId) -> Suggestion:
         """Get a suggestion.
 
-        A retracted one too, with its retraction.
+        Retracted suggestions are returned, too, with their retraction.
         """
         return cast(Suggestion, self.request_json("GET", "/api/v1/suggestions/{id}", {"id": suggestion_id}))
 

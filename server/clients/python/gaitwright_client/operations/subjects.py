@@ -128,7 +128,7 @@ class SubjectsMethods(Transport):
     ) -> MuscleParameters:
         """Set measured muscle values of a subject.
 
-        New studies use them.
+        New studies use these values.
 
         Fields: optionally gas, glu, ham, hfl, scaled_to_body, sol, ta, vas.
         """

@@ -65,9 +65,9 @@ class TrialsMethods(Transport):
         range: Only trials whose value in this column is at least `from` and at most `to`. Trials without a value are
         left out.
 
-        from: Least value in the column `range`, in the unit of the column. Without it, the range has no lower end.
+        from: Minimum in the column `range`, in the unit of the column. Without it, the range has no lower end.
 
-        to: Greatest value in the column `range`. Without it, the range has no upper end.
+        to: Maximum in the column `range`. Without it, the range has no upper end.
         """
         return Pages(
             self,
@@ -87,7 +87,7 @@ class TrialsMethods(Transport):
     def get_trial(self, trial_id: TrialId) -> Trial:
         """Get a trial.
 
-        Its action, state, reason and result. Null where there is none yet.
+        The action, state, reason and result of the trial. Values that do not exist are null.
         """
         return cast(Trial, self.request_json("GET", "/api/v1/trials/{id}", {"id": trial_id}))
 
@@ -258,9 +258,9 @@ class TrialsMethods(Transport):
     def list_local_optima(self, trial_id: TrialId, *, page_size: Optional[int] = None) -> Pages[LocalOptimum]:
         """List local optima of a trial.
 
-        The gaits that the initial guesses of its cold start led to; one of them is the result of the trial. Sorted by
-        number. Each is a candidate for the root gait of a study: `solve_options.local_optimum_choice` can name its
-        number. Empty after a warm start, without a gait, and in imported studies.
+        The gaits to which the initial guesses of the cold start of the trial led; one of them is the result of the
+        trial. Sorted by number. Each is a candidate for the root gait of a study: `solve_options.local_optimum_choice`
+        can name its number. Empty after a warm start, without a gait, and in imported studies.
         """
         return Pages(self, "/api/v1/trials/{id}/local-optima", {"id": trial_id}, query={"limit": page_size})
 
