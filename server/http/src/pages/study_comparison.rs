@@ -52,7 +52,7 @@ struct StudyComparisonPage {
 }
 
 /// The recommended gait of a study, or why there is none.
-struct ComparedGait {
+struct BestOfStudy {
     study: StudyId,
     name: String,
     /// The trial and its number.
@@ -67,7 +67,7 @@ struct Compared {
     comparable: bool,
     /// Whether Gait RMSE alone ranks the gaits of every study, so that the recommended gaits are sorted by it.
     ranked: bool,
-    recommended: Vec<ComparedGait>,
+    recommended: Vec<BestOfStudy>,
     /// The utility of the recommended gait of each study in which people answer.
     utilities: Vec<PageChart>,
     /// Gait RMSE of the best actions.
@@ -160,7 +160,7 @@ fn people_answer(study: &Study) -> bool {
     study.plan.answer_source != AnswerSource::GaitRmse
 }
 
-impl ComparedGait {
+impl BestOfStudy {
     fn of(snapshot: &StudySnapshot, outcome: &StudyOutcome, comparable: bool, asks_people: bool) -> Self {
         let best = outcome.best.and_then(|id| snapshot.trial(id));
         let mut words = Vec::new();
@@ -260,10 +260,10 @@ fn compare(pool: &OnPool, all: &[StudyResults], analyses: &Analyses) -> Result<C
     let asks_people = snapshots.iter().any(|snapshot| people_answer(&snapshot.study));
     let ranked = comparable && !asks_people;
     let recommended =
-        both.iter().map(|(snapshot, outcome)| ComparedGait::of(snapshot, outcome, comparable, asks_people));
-    let mut recommended: Vec<ComparedGait> = recommended.collect();
+        both.iter().map(|(snapshot, outcome)| BestOfStudy::of(snapshot, outcome, comparable, asks_people));
+    let mut recommended: Vec<BestOfStudy> = recommended.collect();
     if ranked {
-        let rmse = |gait: &ComparedGait| gait.gait_rmse_rad.unwrap_or(f64::INFINITY);
+        let rmse = |gait: &BestOfStudy| gait.gait_rmse_rad.unwrap_or(f64::INFINITY);
         recommended.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
     }
     let mut utilities = Vec::new();
