@@ -121,13 +121,14 @@ impl Scheduler {
                 Ok(Recorded::Stopped) => {}
                 Err(error) => tracing::error!(trial = %attempt.trial, %error, "cannot record a trial"),
             }
+            // Until then, the record does not have the iterations.
+            scheduler.0.running_solves.close(attempt.trial);
             scheduler.changed();
         });
     }
 
     /// Records the result of an attempt. If the result depends on simulated walks, it waits for them.
     async fn ended(&self, attempt: Attempt, worker: &str, result: AssignmentResult) -> Result<Recorded, Error> {
-        self.0.running_solves.close(attempt.trial);
         let mut store = self.0.store.clone();
         let Some(lease) = self.lease_of(attempt).await? else { return Ok(Recorded::Done) };
         let (outcome, iterations) = match result {
