@@ -167,7 +167,7 @@ async fn reference_chart_has_a_deviation_band_or_states_that_it_has_none() {
 #[tokio::test]
 async fn chart_of_a_running_solve_remains_after_its_end() {
     let folder = tempfile::tempdir().unwrap();
-    let solver = Analytic::slow(std::time::Duration::from_millis(60));
+    let solver = Analytic::slow(std::time::Duration::from_millis(150));
     let service = Service::start(&folder.path().join("a.db"), solver, 1).await;
     let study = service.study(|new| new.number_of_trials = 1).await;
     let page = format!("/studies/{study}");

@@ -258,15 +258,16 @@ async fn trials_that_change_state_between_two_pages_hide_and_repeat_no_other_tri
     }
     // A trial without the value is in no range of it.
     let (all, some) =
-        (format!("{trials}range=gait_rmse_rad&"), format!("{trials}range=gait_rmse_rad&from=0.3&to=0.45&"));
+        (format!("{trials}range=gait_rmse_rad&"), format!("{trials}range=gait_rmse_rad&at_least=0.3&at_most=0.45&"));
     assert_eq!(numbers(&service, &all, 3, async |_| ()).await, [1, 2, 4, 6, 7]);
     assert_eq!(numbers(&service, &some, 1, async |_| ()).await, [2, 4, 7]);
     assert_eq!(numbers(&service, &format!("{some}sort=-gait_rmse_rad&"), 2, async |_| ()).await, [7, 2, 4]);
     let bound = service.trials(study).await[0].action.to_array()[0];
-    let of_bound = numbers(&service, &format!("{trials}range=a1&from={bound}&to={bound}&"), 2, async |_| ()).await;
+    let of_bound =
+        numbers(&service, &format!("{trials}range=a1&at_least={bound}&at_most={bound}&"), 2, async |_| ()).await;
     assert!(of_bound.contains(&1), "{of_bound:?}");
-    assert!(numbers(&service, &format!("{trials}range=a1&to=-1&"), 2, async |_| ()).await.is_empty());
-    for wrong in ["from=1", "to=1", "range=number", "range=a1&from=NaN", "range=a1&to=x"] {
+    assert!(numbers(&service, &format!("{trials}range=a1&at_most=-1&"), 2, async |_| ()).await.is_empty());
+    for wrong in ["at_least=1", "at_most=1", "range=number", "range=a1&at_least=NaN", "range=a1&at_most=x"] {
         let refused = service.fetch(&format!("{trials}{wrong}")).await;
         assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY, "{wrong}: {}", refused.text);
     }

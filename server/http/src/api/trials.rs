@@ -32,13 +32,13 @@ pub(super) struct TrialQuery {
     #[serde(default)]
     sort: Sort,
     range: Option<RangeColumn>,
-    from: Option<f64>,
-    to: Option<f64>,
+    at_least: Option<f64>,
+    at_most: Option<f64>,
 }
 
 impl TrialQuery {
     fn range(&self) -> Result<Option<ValueRange>, Error> {
-        let ends = [("from", self.from), ("to", self.to)];
+        let ends = [("at_least", self.at_least), ("at_most", self.at_most)];
         for (name, end) in ends {
             if let Some(end) = end.filter(|end| !end.is_finite()) {
                 return Err(Error::invalid(name, end.to_string(), "a finite number"));
@@ -48,7 +48,7 @@ impl TrialQuery {
             let given = ends.into_iter().find_map(|(name, end)| Some((name, end?)));
             return given.map_or(Ok(None), |(name, end)| Err(Error::invalid(name, end, "absent without range")));
         };
-        let (from, to) = (self.from.unwrap_or(f64::MIN), self.to.unwrap_or(f64::MAX));
+        let (from, to) = (self.at_least.unwrap_or(f64::MIN), self.at_most.unwrap_or(f64::MAX));
         Ok(Some(ValueRange { column, from, to }))
     }
 }
@@ -103,9 +103,9 @@ impl<'de> Deserialize<'de> for Sort {
         ("id" = StudyId, Path, description = "Identifier of the study"),
         ("state" = Option<TrialState>, Query, description = "Only trials in this state"),
         ("sort" = Option<String>, Query, description = "Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a value come last"),
-        ("range" = Option<String>, Query, description = "Only trials whose value in this column is at least `from` and at most `to`. Trials without a value are left out"),
-        ("from" = Option<f64>, Query, description = "Minimum in the column `range`, in the unit of the column. Without it, the range has no lower end"),
-        ("to" = Option<f64>, Query, description = "Maximum in the column `range`. Without it, the range has no upper end")
+        ("range" = Option<String>, Query, description = "Only trials whose value in this column is between `at_least` and `at_most`. Trials without a value are left out"),
+        ("at_least" = Option<f64>, Query, description = "Minimum in the column `range`, in the unit of the column. Without it, the range has no lower end"),
+        ("at_most" = Option<f64>, Query, description = "Maximum in the column `range`. Without it, the range has no upper end")
     ),
     responses((status = 200, description = "A page", body = Page<Trial>), (status = 409, description = "The subject withdrew consent")),
     security(("token" = ["read"]), ("session" = ["read"])),

@@ -48,8 +48,8 @@ class TrialsMethods(Transport):
         state: Optional[TrialState] = None,
         sort: Optional[ListTrialsSort] = None,
         range: Optional[ListTrialsRange] = None,
-        from: Optional[float] = None,
-        to: Optional[float] = None,
+        at_least: Optional[float] = None,
+        at_most: Optional[float] = None,
         page_size: Optional[int] = None,
     ) -> Pages[Trial]:
         """List trials of a study.
@@ -62,18 +62,18 @@ class TrialsMethods(Transport):
         sort: Column to sort by, such as `gait_rmse_rad`. A leading minus sorts in descending order. Trials without a
         value come last.
 
-        range: Only trials whose value in this column is at least `from` and at most `to`. Trials without a value are
+        range: Only trials whose value in this column is between `at_least` and `at_most`. Trials without a value are
         left out.
 
-        from: Minimum in the column `range`, in the unit of the column. Without it, the range has no lower end.
+        at_least: Minimum in the column `range`, in the unit of the column. Without it, the range has no lower end.
 
-        to: Maximum in the column `range`. Without it, the range has no upper end.
+        at_most: Maximum in the column `range`. Without it, the range has no upper end.
         """
         return Pages(
             self,
             "/api/v1/studies/{id}/trials",
             {"id": study_id},
-            query={"state": state, "sort": sort, "range": range, "from": from, "to": to, "limit": page_size},
+            query={"state": state, "sort": sort, "range": range, "at_least": at_least, "at_most": at_most, "limit": page_size},
         )
 
     def get_trials_csv(self, study_id: StudyId) -> str:
