@@ -699,7 +699,7 @@ async fn several_studies_are_compared_in_one_chart_and_one_table() {
     let rmse = sentence.split("Gait RMSE ").skip(1).map(|rest| rest.split(' ').next().unwrap().parse::<f64>().unwrap());
     let rmse: Vec<f64> = rmse.collect();
     assert!(rmse.len() == 3 && rmse.is_sorted(), "{sentence}");
-    let file = page.split("/figures/").nth(1).unwrap().split("\"").next().unwrap().replace(".svg", ".csv");
+    let file = page.split("/figures/").nth(1).unwrap().split('"').next().unwrap().replace(".svg", ".csv");
     let file = service.fetch(&format!("/api/v1/studies/{}/figures/{file}", studies[0])).await;
     assert_eq!(file.status, StatusCode::OK, "{}", file.text);
     for study in &studies[..3] {
