@@ -5,7 +5,7 @@ use crate::supervise::Task;
 use gaitwright_store::studies::{self, StudyState};
 use gaitwright_store::{Store, StudyId};
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::Duration;
 use tokio::process::Command;
@@ -35,7 +35,7 @@ pub async fn give_notices(store: Store, program: PathBuf, task: Task) -> Result<
     }
 }
 
-async fn run(program: &PathBuf, study: StudyId, state: StudyState) {
+async fn run(program: &Path, study: StudyId, state: StudyState) {
     let mut command = Command::new(program);
     command.arg(study.to_string()).arg(state.as_str()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     // Settings of the service can contain passwords.

@@ -43,7 +43,8 @@ pub(super) async fn get(
 
 /// Download the atlas as CSV
 ///
-/// The bounds of each action that has a result, and the gait that it has.
+/// The bounds of each action that has a result, and the gait that it has. Of a gait that the record no longer has, or from
+/// which nothing can be computed, only the results of its solve are given.
 #[utoipa::path(
     get,
     path = "/studies/{id}/atlas.csv",

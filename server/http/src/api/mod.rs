@@ -32,6 +32,7 @@ mod reference_gaits;
 mod safety_reports;
 mod sensitivities;
 mod sessions;
+mod sort_column;
 mod studies;
 mod study_archives;
 mod study_comparison;

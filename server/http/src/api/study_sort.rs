@@ -1,5 +1,6 @@
 //! The order of studies in a list.
 
+use super::sort_column::column_and_direction;
 use gaitwright_store::studies::StudyColumn;
 use serde::de::{Deserialize, Deserializer, Error as _};
 
@@ -20,11 +21,8 @@ impl Default for StudySort {
 impl<'de> Deserialize<'de> for StudySort {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let sort = String::deserialize(deserializer)?;
-        let (ascending, name) = sort.strip_prefix('-').map_or((true, &*sort), |name| (false, name));
-        let column = StudyColumn::ALL.into_iter().find(|column| column.as_str() == name).ok_or_else(|| {
-            let names = StudyColumn::ALL.map(StudyColumn::as_str).join(", ");
-            D::Error::custom(format!("one of {names}, with a leading minus for descending order"))
-        })?;
-        Ok(Self { column, ascending })
+        let found = column_and_direction(&sort, &StudyColumn::ALL, StudyColumn::as_str);
+        let (column, descending) = found.map_err(D::Error::custom)?;
+        Ok(Self { column, ascending: !descending })
     }
 }

@@ -1,6 +1,7 @@
 //! REST: trials.
 
 use super::jobs::Job;
+use super::sort_column::column_and_direction;
 use crate::AppState;
 use crate::accessible::Id;
 use crate::authorization::Authorized;
@@ -81,11 +82,7 @@ impl Default for Sort {
 impl<'de> Deserialize<'de> for Sort {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let sort = String::deserialize(deserializer)?;
-        let (descending, name) = sort.strip_prefix('-').map_or((false, &*sort), |name| (true, name));
-        let column = SORTS.into_iter().find(|column| *column == name).ok_or_else(|| {
-            let names = SORTS.join(", ");
-            D::Error::custom(format!("one of {names}, with a leading minus for descending order"))
-        })?;
+        let (column, descending) = column_and_direction(&sort, &SORTS, |name| name).map_err(D::Error::custom)?;
         Ok(Self { column, descending })
     }
 }

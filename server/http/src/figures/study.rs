@@ -85,7 +85,8 @@ impl StudyWithBest {
 /// The paper's figures for a study, and for others beside it.
 ///
 /// # Errors
-/// [`Error::Invalid`] for more than [`MAX_IN_A_CHART`] studies; a conflict when the subject of one of them withdrew, [`Error::NotFound`]; errors of the database.
+/// [`Error::Invalid`] for more than [`MAX_IN_A_CHART`] studies; a conflict when the subject of one of them withdrew,
+/// [`Error::NotFound`]; errors of the database.
 pub(crate) async fn of_study(app: &mut AppState, id: StudyId, others: &[StudyId]) -> Result<StudyFigures, Error> {
     if others.len() >= MAX_IN_A_CHART {
         let most = format!("at most {} studies", MAX_IN_A_CHART - 1);

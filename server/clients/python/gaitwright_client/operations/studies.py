@@ -130,7 +130,8 @@ class StudiesMethods(Transport):
     def get_atlas_csv(self, study_id: StudyId) -> str:
         """Download the atlas as CSV.
 
-        The bounds of each action that has a result, and the gait that it has.
+        The bounds of each action that has a result, and the gait that it has. Of a gait that the record no longer has,
+        or from which nothing can be computed, only the results of its solve are given.
         """
         return self.request_text("GET", "/api/v1/studies/{id}/atlas.csv", {"id": study_id})
 

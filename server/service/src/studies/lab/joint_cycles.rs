@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn each_leg_has_its_own_cycle() {
         let cycles = joint_cycles(&recording());
-        let of = |joint: &str| cycles.iter().find(|cycle| cycle.joint == joint).cloned().into_iter().next();
+        let of = |joint: &str| cycles.iter().find(|cycle| cycle.joint == joint);
         let (left, right) = (of("knee_L"), of("knee_R"));
         let (Some(left), Some(right)) = (left, right) else { panic!("{cycles:?}") };
         assert_eq!(left.mean_rad.len(), 101);
